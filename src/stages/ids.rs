@@ -4,10 +4,32 @@
 
 use outcrop_disk::spill::{Row, Word};
 use serde::{Deserialize, Serialize};
+use std::fmt::Debug;
+use std::hash::Hash;
 use std::ops::Range;
 
 /// The width of ids.
 pub type Width = u32;
+
+/// A number that is an index in a list.
+pub trait Number: Copy + Ord + Hash + Debug + Default {
+    /// With this index.
+    fn at(index: usize) -> Self;
+    /// The index.
+    fn index(self) -> usize;
+}
+
+/// Plain numbers, for tests.
+#[cfg(test)]
+impl Number for u32 {
+    fn at(index: usize) -> Self {
+        index as Self
+    }
+
+    fn index(self) -> usize {
+        self as usize
+    }
+}
 
 /// Defines a type of numbers.
 macro_rules! number {
@@ -50,6 +72,18 @@ macro_rules! number {
                 self.0 as usize
             }
         }
+
+        impl Number for $name {
+            #[inline(always)]
+            fn at(index: usize) -> Self {
+                Self::at(index)
+            }
+
+            #[inline(always)]
+            fn index(self) -> usize {
+                self.index()
+            }
+        }
     };
 }
 
@@ -66,6 +100,62 @@ number! {
 number! {
     /// The number of a tile.
     TileNumber: u32
+}
+
+number! {
+    /// The place of a triangle in a list of triangles of a block.
+    TriangleIndex: u32
+}
+
+number! {
+    /// The number of a patch of a block.
+    PatchNumber: u32
+}
+
+number! {
+    /// A label in the numbering of a block.
+    Label: u32
+}
+
+number! {
+    /// A label in the numbering of the whole surface.
+    GlobalLabel: u32
+}
+
+number! {
+    /// The number of a component of a block's triangles during insertion.
+    Component: u32
+}
+
+number! {
+    /// An edge of a triangle, see [`side`](crate::surface::sides::side).
+    Side: u32
+}
+
+impl PatchNumber {
+    /// Stands for no patch.
+    pub const NONE: Self = Self(u32::MAX);
+}
+
+impl Side {
+    /// Stands for an edge without a second triangle inside the block.
+    pub const NONE: Self = Self(u32::MAX);
+}
+
+impl Label {
+    /// Stands for no label.
+    pub const NONE: Self = Self(u32::MAX);
+}
+
+impl GlobalLabel {
+    /// Stands for no label.
+    pub const NONE: Self = Self(u32::MAX);
+
+    /// The global label of a label of the block whose label 0 has this one.
+    #[must_use]
+    pub const fn of(self, label: Label) -> Self {
+        Self(self.0 + label.0)
+    }
 }
 
 /// An id in a list of ids.

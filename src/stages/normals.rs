@@ -78,7 +78,7 @@ impl<'a> Normals<'a> {
     /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
     pub fn open(&self, unit: &Unit<'_>, ids: Ids) -> Result<Given> {
         Ok(Given {
-            ids: ids,
+            ids,
             blocks: self.blocks,
             words: self.stored.open(unit, ids.iter())?,
         })

@@ -267,7 +267,7 @@ impl Fans {
     /// The normal of the fan around a vertex that has a triangle: the sum of those of its triangles, weighed by
     /// their areas.
     fn normal(&self, v: Id, triangle: OrientedTriangle, points: &Located) -> Normal {
-        let star = self.star.at(v).iter().map(|n| self.triangles[*n as usize]);
+        let star = self.star.at(v).iter().map(|n| self.triangles[n.index()]);
         let mut link = Link::default();
         link.set(v, star.clone());
         let own = star.clone().position(|t| t == triangle);

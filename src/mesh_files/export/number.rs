@@ -192,10 +192,10 @@ pub fn split_block(
     for &v in pinches {
         let at = star.at(v);
         // Triangles ascend, so fans are numbered by their smallest triangles.
-        link.set(v, at.iter().map(|&n| triangles[n as usize]));
+        link.set(v, at.iter().map(|&n| triangles[n.index()]));
         for (index, &n) in at.iter().enumerate() {
             if let Some(fan) = link.group(index).checked_sub(1) {
-                let t = sorted(triangles[n as usize]);
+                let t = sorted(triangles[n.index()]);
                 let copy = (copies.len() + fan) as u32;
                 splits.push(Split {
                     to: blocks.of(t[0]),

@@ -5,6 +5,7 @@ use super::facing::{Fate, Sums, SumsRow, judge};
 use super::rows::SeenTriangle;
 use super::{RepairOptions, RepairStats, ascending};
 use crate::blocks::Blocks;
+use crate::ids::{GlobalLabel, Label};
 use crate::located::Places;
 use crate::outside::Known;
 use crate::surface::parity::{ParitySets, constraint};
@@ -21,9 +22,9 @@ use std::sync::Mutex;
 pub(super) fn join(
     unit: &Unit<'_>,
     seen: &Inbox<SeenTriangle>,
-    globals: &[(u32, u32)],
+    globals: &[(GlobalLabel, u32)],
     labels: u32,
-) -> Result<ParitySets> {
+) -> Result<ParitySets<GlobalLabel>> {
     let mut sets = ParitySets::new(labels as usize);
     for block in 0..globals.len() {
         unit.check_cancel()?;
@@ -32,7 +33,7 @@ pub(super) fn join(
         for same in all.chunk_by(|a, b| a.triangle == b.triangle) {
             let global = |s: &SeenTriangle| {
                 let (label, flip) = constraint(s.label_flip);
-                (globals[s.block.index()].0 + label, flip)
+                (globals[s.block.index()].0.of(label), flip)
             };
             let (first, flip) = global(&same[0]);
             for (label, other) in same[1..].iter().map(global) {
@@ -55,9 +56,9 @@ pub(super) struct Parts<'a> {
     /// Bridges that several blocks see.
     pub bridges: &'a Inbox<TriangleTo>,
     /// For each block, the number of its first global label, and how many global labels it has.
-    pub globals: &'a [(u32, u32)],
+    pub globals: &'a [(GlobalLabel, u32)],
     /// The merged labels.
-    pub sets: &'a ParitySets,
+    pub sets: &'a ParitySets<GlobalLabel>,
 }
 
 impl Parts<'_> {
@@ -67,8 +68,8 @@ impl Parts<'_> {
         unit: &Unit<'_>,
         options: RepairOptions,
         stats: &mut RepairStats,
-    ) -> Result<(Vec<u32>, Vec<Fate>)> {
-        let all: Mutex<FxHashMap<u32, Sums>> = Mutex::default();
+    ) -> Result<(Vec<GlobalLabel>, Vec<Fate>)> {
+        let all: Mutex<FxHashMap<GlobalLabel, Sums>> = Mutex::default();
         let bytes = |block: usize| {
             let labels = self.globals[block].1;
             let ids = self.blocks.ids(block).len();
@@ -85,11 +86,11 @@ impl Parts<'_> {
         })?;
         let all = std::mem::take(&mut *lock(&all));
         let _held = unit.reserve("components", all.len() as u64 * 500)?;
-        let fates: FxHashMap<u32, Fate> = all
+        let fates: FxHashMap<GlobalLabel, Fate> = all
             .iter()
             .map(|(root, sums)| (*root, judge(sums, options.least(), stats)))
             .collect();
-        let labels = (0..self.sets.len() as u32).map(|label| {
+        let labels = (0..self.sets.len()).map(GlobalLabel::at).map(|label| {
             let (root, turned) = self.sets.look(label);
             // Every label has an entry.
             let fate = fates.get(&root).copied().unwrap_or(Fate::UNKNOWN);
@@ -101,11 +102,12 @@ impl Parts<'_> {
 
     /// Sums over a block's interior triangles and over the crossing ones whose smallest vertex is in it, by
     /// the roots of their labels.
-    fn sum(&self, unit: &Unit<'_>) -> Result<FxHashMap<u32, Sums>> {
+    fn sum(&self, unit: &Unit<'_>) -> Result<FxHashMap<GlobalLabel, Sums>> {
         let block = unit.number();
-        let mut own: FxHashMap<u32, Sums> = FxHashMap::default();
-        for (label, row) in (self.globals[block].0..).zip(self.sums.get(unit, block)?) {
-            let (root, turned) = self.sets.look(label);
+        let mut own: FxHashMap<GlobalLabel, Sums> = FxHashMap::default();
+        let first = self.globals[block].0;
+        for (label, row) in (0..).map(Label::new).zip(self.sums.get(unit, block)?) {
+            let (root, turned) = self.sets.look(first.of(label));
             let sums = Sums::of(&row);
             own.entry(root).or_default().merge(&sums, turned);
         }
@@ -129,7 +131,7 @@ impl Parts<'_> {
                 continue;
             }
             let (label, flip) = constraint(first.label_flip);
-            let label = self.globals[first.block.index()].0 + label;
+            let label = self.globals[first.block.index()].0.of(label);
             let (root, turned) = self.sets.look(label);
             // The positions of all corners were fetched.
             let corners = triangle.map(|v| points[ids.partition_point(|id| *id < v)]);

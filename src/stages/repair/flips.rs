@@ -9,8 +9,8 @@
 //! alone. Boundary edges, components and fans are preserved.
 
 use super::around::merge;
-use crate::ids::{Id, Ids};
-use crate::surface::sides::{NONE, across, parts, side};
+use crate::ids::{Id, Ids, Side, TriangleIndex};
+use crate::surface::sides::{across, parts, side};
 use crate::surface::star::Triangle;
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_geom::method::METHOD;
@@ -23,7 +23,7 @@ struct Slot {
     /// Corners by index in the block, in the triangle's orientation.
     corners: [u32; 3],
     /// For the edge opposite each corner: the adjacent triangle, and its corner opposite this edge.
-    across: [u32; 3],
+    across: [Side; 3],
     /// Unit normal.
     normal: [f32; 3],
     /// For the edge opposite each corner: the bend there, i.e. the distance of the two unit normals.
@@ -36,7 +36,7 @@ pub struct Sheet<'a> {
     ids: Ids,
     points: &'a [Point],
     /// Their numbers among all triangles of the block.
-    numbers: Vec<u32>,
+    numbers: Vec<TriangleIndex>,
     slots: Vec<Slot>,
     /// Fixed vertices, which take part in no flip: some of their triangles are outside the sheet, or they are
     /// on the boundary.
@@ -67,7 +67,7 @@ impl<'a> Sheet<'a> {
         let mut these: Vec<Triangle> = Vec::new();
         for (number, t) in triangles.iter().enumerate() {
             if inside(t) && moved(t) {
-                numbers.push(number as u32);
+                numbers.push(TriangleIndex::at(number));
                 these.push(t.map(|v| Id::at(ids.place(v))));
             } else {
                 for v in t.iter().filter(|v| ids.contains(v)) {
@@ -76,7 +76,7 @@ impl<'a> Sheet<'a> {
             }
         }
         let across = across(Ids::at(&(0..points.len())), &these);
-        let slot = |(t, across): (&Triangle, &[u32; 3])| {
+        let slot = |(t, across): (&Triangle, &[Side; 3])| {
             let corners = t.map(|v| v.index() as u32);
             Slot {
                 corners,
@@ -127,7 +127,7 @@ impl<'a> Sheet<'a> {
     /// Fixes the vertices of boundary edges.
     fn fixed(&mut self) {
         for slot in &self.slots {
-            for k in (0..3).filter(|&k| slot.across[k] == NONE) {
+            for k in (0..3).filter(|&k| slot.across[k] == Side::NONE) {
                 for v in [slot.corners[next(k)], slot.corners[last(k)]] {
                     self.fixed[v as usize] = true;
                 }
@@ -141,7 +141,7 @@ impl<'a> Sheet<'a> {
             for k in 0..3 {
                 let behind = self.slots[number].across[k];
                 let (other, corner) = parts(behind);
-                if behind != NONE && number < other {
+                if behind != Side::NONE && number < other {
                     let seen = self.seen_from(number, k, behind);
                     let bend = distance(self.slots[number].normal, seen);
                     self.slots[number].bends[k] = bend;
@@ -152,7 +152,7 @@ impl<'a> Sheet<'a> {
         for (number, slot) in self.slots.iter().enumerate() {
             let mut bits = 0;
             for (k, &behind) in slot.across.iter().enumerate() {
-                let own = behind != NONE && number < parts(behind).0;
+                let own = behind != Side::NONE && number < parts(behind).0;
                 bits |= u64::from(own && self.around(number, k, behind) >= METHOD.flips.bent) << k;
             }
             self.due[number / 16] |= bits << (number % 16 * 4);
@@ -161,7 +161,7 @@ impl<'a> Sheet<'a> {
 
     /// The sum of bends at the five edges of the quadrilateral of an edge.
     #[inline]
-    fn around(&self, number: usize, k: usize, behind: u32) -> f32 {
+    fn around(&self, number: usize, k: usize, behind: Side) -> f32 {
         let (other, corner) = parts(behind);
         let (mine, theirs) = (&self.slots[number].bends, &self.slots[other].bends);
         mine[k] + (mine[next(k)] + mine[last(k)]) + (theirs[next(corner)] + theirs[last(corner)])
@@ -170,14 +170,14 @@ impl<'a> Sheet<'a> {
     /// The normal of triangle `behind` the edge opposite corner `k` of triangle `number`, negated if the two
     /// are not oriented alike.
     #[inline]
-    fn seen_from(&self, number: usize, k: usize, behind: u32) -> [f32; 3] {
+    fn seen_from(&self, number: usize, k: usize, behind: Side) -> [f32; 3] {
         self.facing(behind, self.slots[number].corners[next(k)])
     }
 
     /// The normal of triangle `behind` an edge that starts at `from` in the neighbour; negated unless the
     /// triangle runs along the edge in the opposite direction.
     #[inline]
-    fn facing(&self, behind: u32, from: u32) -> [f32; 3] {
+    fn facing(&self, behind: Side, from: u32) -> [f32; 3] {
         let (other, corner) = parts(behind);
         let slot = &self.slots[other];
         // A sign instead of a branch, since both cases are equally frequent.
@@ -208,7 +208,7 @@ impl<'a> Sheet<'a> {
                     break;
                 };
                 let behind = slot.across[k];
-                if behind != NONE
+                if behind != Side::NONE
                     && number < parts(behind).0
                     && let Some(flip) = self.gain(number, k, behind)
                 {
@@ -222,7 +222,7 @@ impl<'a> Sheet<'a> {
 
     /// The outcome of flipping the edge opposite corner `k` of `number`, if it lowers the sum of bends.
     #[inline]
-    fn gain(&self, number: usize, k: usize, behind: u32) -> Option<Flip> {
+    fn gain(&self, number: usize, k: usize, behind: Side) -> Option<Flip> {
         let was = self.around(number, k, behind);
         if was < METHOD.flips.bent {
             return None;
@@ -276,7 +276,7 @@ impl<'a> Sheet<'a> {
 
     /// The triangles adjacent to the sides `cu`, `ud`, `dv`, `vc` of the quadrilateral of an edge.
     #[inline]
-    fn behind(&self, number: usize, k: usize, behind: u32) -> [u32; 4] {
+    fn behind(&self, number: usize, k: usize, behind: Side) -> [Side; 4] {
         let (other, corner) = parts(behind);
         let (mine, theirs) = (&self.slots[number].across, &self.slots[other].across);
         let u = self.slots[number].corners[next(k)];
@@ -291,14 +291,14 @@ impl<'a> Sheet<'a> {
 
     /// The normals of the triangles adjacent to these sides, oriented like `number`.
     #[inline]
-    fn sides(&self, number: usize, k: usize, behind: u32) -> [Option<[f32; 3]>; 4] {
+    fn sides(&self, number: usize, k: usize, behind: Side) -> [Option<[f32; 3]>; 4] {
         let (c, u, v) = self.named(number, k);
         let (other, corner) = parts(behind);
         let d = self.slots[other].corners[corner];
         let all = self.behind(number, k, behind);
         let from = [c, u, d, v];
         // The quadrilateral runs c, u, d, v.
-        std::array::from_fn(|i| (all[i] != NONE).then(|| self.facing(all[i], from[i])))
+        std::array::from_fn(|i| (all[i] != Side::NONE).then(|| self.facing(all[i], from[i])))
     }
 
     /// True if one of the two new triangles is degenerate, or is slender and less regular than both old ones.
@@ -316,7 +316,7 @@ impl<'a> Sheet<'a> {
             let (mut at, mut through) = (number, begin);
             loop {
                 let behind = self.slots[at].across[through];
-                if behind == NONE {
+                if behind == Side::NONE {
                     return (false, false);
                 }
                 let (other, corner) = parts(behind);
@@ -340,12 +340,12 @@ impl<'a> Sheet<'a> {
     }
 
     /// Carries out a flip.
-    fn turn(&mut self, number: usize, k: usize, behind: u32, flip: Flip) {
+    fn turn(&mut self, number: usize, k: usize, behind: Side, flip: Flip) {
         let (other, corner) = parts(behind);
         let (c, u, v) = self.named(number, k);
         let d = self.slots[other].corners[corner];
         let [cu, ud, dv, vc] = self.behind(number, k, behind);
-        let [one, two] = [number as u32, other as u32];
+        let [one, two] = [number, other].map(TriangleIndex::at);
         self.slots[number].corners = [u, d, c];
         self.slots[other].corners = [d, v, c];
         self.slots[number].across = [side(two, 1), cu, ud];
@@ -361,7 +361,7 @@ impl<'a> Sheet<'a> {
             (vc, side(two, 0), at_vc),
         ];
         for (side, mine, bend) in sides {
-            if side != NONE {
+            if side != Side::NONE {
                 let (triangle, corner) = parts(side);
                 self.slots[triangle].across[corner] = mine;
                 self.slots[triangle].bends[corner] = bend;
@@ -371,8 +371,8 @@ impl<'a> Sheet<'a> {
             self.flipped[triangle] = true;
             for k in 0..3 {
                 let behind = self.slots[triangle].across[k];
-                let owner = side(triangle as u32, k as u32);
-                let owner = owner.min(behind) as usize;
+                let owner = side(TriangleIndex::at(triangle), k as u32);
+                let owner = owner.min(behind).index();
                 self.due[owner / 64] |= 1 << (owner % 64);
             }
         }
@@ -389,10 +389,10 @@ impl<'a> Sheet<'a> {
             gone.push(self.numbers[number]);
         }
         new.sort_unstable();
-        let (mut number, mut gone) = (0, gone.into_iter().peekable());
+        let (mut numbers, mut gone) = (0.., gone.into_iter().peekable());
         triangles.retain(|_| {
-            number += 1;
-            gone.next_if_eq(&(number - 1)).is_none()
+            let number = numbers.next().map(TriangleIndex::new);
+            gone.next_if(|gone| number == Some(*gone)).is_none()
         });
         merge(triangles, new.into_iter());
     }

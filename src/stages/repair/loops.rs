@@ -48,7 +48,7 @@ pub fn steps(
     let mut fans: Vec<Fan> = Vec::new();
     for v in vertices {
         let at = star.at(v);
-        let edges = at.iter().map(|&n| after(ids(&triangles[n as usize]), v));
+        let edges = at.iter().map(|&n| after(ids(&triangles[n.index()]), v));
         match ends(edges) {
             Ends::None => continue,
             Ends::One { start, apex, end } => {
@@ -63,11 +63,11 @@ pub fn steps(
             }
             Ends::More => pinch(v),
         }
-        link.set(v, at.iter().map(|&n| ids(&triangles[n as usize])));
+        link.set(v, at.iter().map(|&n| ids(&triangles[n.index()])));
         fans.clear();
         for group in 0..link.groups() {
             let members = (0..at.len()).filter(|&i| link.group(i) == group);
-            let members = members.map(|i| &triangles[at[i] as usize]);
+            let members = members.map(|i| &triangles[at[i].index()]);
             fans.extend(fan(v, members, &position));
         }
         pair_up(v, &fans, &position, &mut |incoming, outgoing| {
@@ -224,5 +224,5 @@ fn clockwise(axis: [f64; 3], s: [f64; 3], e: [f64; 3]) -> u64 {
 /// The one-ring of a vertex: all vertices connected to it by an edge.
 pub fn neighbors(star: &Star, triangles: &[InComponent], v: Id) -> Vec<Id> {
     let around = star.at(v).iter();
-    ascending(around.flat_map(|&n| others(ids(&triangles[n as usize]), v)))
+    ascending(around.flat_map(|&n| others(ids(&triangles[n.index()]), v)))
 }

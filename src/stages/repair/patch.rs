@@ -4,8 +4,8 @@
 //! No edge has more than two triangles and the surface is orientable, so the order of the edges does not
 //! matter.
 
-use crate::ids::{Id, Ids};
-use crate::surface::parity::ParitySets;
+use crate::ids::{Id, Ids, Label, Side, TriangleIndex};
+use crate::surface::parity::{ParitySets, Turned, constraint, word};
 use crate::surface::sides::{pair_edges, parts};
 use crate::surface::star::{EDGES, Triangle};
 use outcrop_disk::workspace::memory::bytes_of;
@@ -14,7 +14,7 @@ use outcrop_disk::workspace::memory::bytes_of;
 #[derive(Debug)]
 pub struct Patch {
     /// For each triangle `label << 1 | flip`; `flip` is its orientation relative to its label.
-    pub words: Vec<u32>,
+    pub words: Vec<Turned<Label>>,
     /// Number of labels.
     pub labels: u32,
     /// Number of labels with a triangle that is not interior; their numbers come first.
@@ -26,30 +26,29 @@ pub struct Patch {
 }
 
 /// The word of a triangle without a label.
-const NONE: u32 = u32::MAX;
+const NONE: Turned<Label> = Turned::NONE;
 
 /// The labels of triangles during the traversal of edges.
 struct Labels {
     /// As in [`Patch`], or [`NONE`].
-    words: Vec<u32>,
-    sets: ParitySets,
+    words: Vec<Turned<Label>>,
+    sets: ParitySets<Label>,
 }
 
 impl Labels {
     /// Merges the labels of two triangles; `flip` if one of the two must be turned.
     #[inline]
-    fn relate(&mut self, a: u32, b: u32, flip: bool) {
-        let (a, b, flip) = (a as usize, b as usize, u32::from(flip));
+    fn relate(&mut self, a: usize, b: usize, flip: bool) {
         match (self.words[a], self.words[b]) {
             (NONE, NONE) => {
-                self.words[a] = self.sets.push() << 1;
-                self.words[b] = self.words[a] ^ flip;
+                self.words[a] = word((self.sets.push(), false));
+                self.words[b] = self.words[a].turn(flip);
             }
-            (known, NONE) => self.words[b] = known ^ flip,
-            (NONE, known) => self.words[a] = known ^ flip,
-            (known, other) if known ^ flip != other => {
-                let turned = (known ^ flip ^ other) & 1 == 1;
-                let fits = self.sets.join(known >> 1, other >> 1, turned);
+            (known, NONE) => self.words[b] = known.turn(flip),
+            (NONE, known) => self.words[a] = known.turn(flip),
+            (known, other) if known.turn(flip) != other => {
+                let ((a, x), (b, y)) = (constraint(known), constraint(other));
+                let fits = self.sets.join(a, b, flip ^ x ^ y);
                 debug_assert!(fits, "a surface that is not orientable");
             }
             _ => {}
@@ -58,8 +57,8 @@ impl Labels {
 
     /// Gives every triangle without a label a label of its own.
     fn complete(&mut self) {
-        for word in self.words.iter_mut().filter(|word| **word == NONE) {
-            *word = self.sets.push() << 1;
+        for unknown in self.words.iter_mut().filter(|word| **word == NONE) {
+            *unknown = word((self.sets.push(), false));
         }
     }
 }
@@ -113,12 +112,12 @@ impl Builder<'_> {
             labels, open, rims, ..
         } = self;
         // An edge between the first and the last vertex of a triangle runs down, others run up.
-        let pair = |a: u32, b: u32| {
+        let pair = |a: Side, b: Side| {
             let ((a, corner), (b, opposite)) = (parts(a), parts(b));
             let flip = (corner == 1) == (opposite == 1);
-            labels.relate(a as u32, b as u32, flip);
+            labels.relate(a, b, flip);
         };
-        let lone = |side: u32, ends: [u32; 2]| {
+        let lone = |side: Side, ends: [u32; 2]| {
             open[parts(side).0] = true;
             for end in ends {
                 let rim = &mut rims[end as usize];
@@ -130,14 +129,14 @@ impl Builder<'_> {
 
     /// Processes the edges with one end in the block.
     fn across(&mut self) {
-        let mut edges: Vec<(Id, Id, u32, bool)> = Vec::new();
+        let mut edges: Vec<(Id, Id, TriangleIndex, bool)> = Vec::new();
         for (number, t) in self.triangles.iter().enumerate() {
             if self.ids.contains(&t[0]) && self.ids.contains(&t[2]) {
                 continue;
             }
             for (a, b, _, up) in EDGES {
                 if self.ids.contains(&t[a]) != self.ids.contains(&t[b]) {
-                    edges.push((t[a], t[b], number as u32, up));
+                    edges.push((t[a], t[b], TriangleIndex::at(number), up));
                 }
             }
         }
@@ -146,11 +145,12 @@ impl Builder<'_> {
         while let Some(&(low, high, number, up)) = rest.first() {
             match rest.get(1) {
                 Some(&(l, h, other, other_up)) if (l, h) == (low, high) => {
-                    self.labels.relate(number, other, up == other_up);
+                    let both = [number, other].map(TriangleIndex::index);
+                    self.labels.relate(both[0], both[1], up == other_up);
                     rest = &rest[2..];
                 }
                 _ => {
-                    self.open[number as usize] = true;
+                    self.open[number.index()] = true;
                     let own = if self.ids.contains(&low) { low } else { high };
                     let rim = &mut self.rims[self.ids.place(own)];
                     *rim = rim.saturating_add(1);
@@ -167,25 +167,26 @@ impl Builder<'_> {
             mut sets,
         } = self.labels;
         sets.flatten();
-        let mut numbers = vec![NONE; sets.len()];
+        let mut numbers = vec![Label::NONE; sets.len()];
         let mut labels = 0;
-        let mut number = |label: u32| {
+        let mut number = |before: Turned<Label>| {
+            let (label, turned) = constraint(before);
             let (root, flip) = sets.look(label);
-            let number = &mut numbers[root as usize];
-            if *number == NONE {
-                *number = labels;
+            let number = &mut numbers[root.index()];
+            if *number == Label::NONE {
+                *number = Label::new(labels);
                 labels += 1;
             }
-            *number << 1 | u32::from(flip)
+            (*number, flip ^ turned)
         };
         let mut global = 0;
         for (word, t) in words.iter().zip(self.triangles) {
             if !(self.ids.contains(&t[0]) && self.ids.contains(&t[2])) {
-                global = global.max((number(word >> 1) >> 1) + 1);
+                global = global.max(number(*word).0.get() + 1);
             }
         }
-        for word in &mut words {
-            *word = number(*word >> 1) ^ (*word & 1);
+        for before in &mut words {
+            *before = word(number(*before));
         }
         Patch {
             words,
@@ -208,12 +209,13 @@ mod tests {
         let triangles = [[0, 1, 2], [1, 2, 3], [2, 3, 4], [5, 6, 7]].map(triangle);
         let patch = Patch::of(Ids::of(0..6), &triangles);
         assert_eq!((patch.labels, patch.global), (2, 1));
-        let labels: Vec<u32> = patch.words.iter().map(|w| w >> 1).collect();
+        let parts = |w: &Turned<Label>| constraint(*w);
+        let labels: Vec<u32> = patch.words.iter().map(|w| parts(w).0.get()).collect();
         assert_eq!(labels, [1, 1, 1, 0]);
         // Adjacent triangles of a strip, with ascending ids, run along their common edge in the same
         // direction.
-        let flips: Vec<u32> = patch.words[..3].iter().map(|w| w & 1).collect();
-        assert_eq!(flips, [0, 1, 0]);
+        let flips: Vec<bool> = patch.words[..3].iter().map(|w| parts(w).1).collect();
+        assert_eq!(flips, [false, true, false]);
         assert_eq!(patch.open, [true, true, true, true]);
         assert_eq!(patch.rims, [2, 2, 2, 2, 2, 2]);
     }

@@ -6,7 +6,7 @@ use super::rows::RimBits;
 use super::surface::Surface;
 use super::{SurfaceTriangle, ascending};
 use crate::blocks::Blocks;
-use crate::ids::{Id, Ids};
+use crate::ids::{Id, Ids, TriangleIndex};
 use crate::located::{Located, Places};
 use crate::surface::star::Star;
 use outcrop_disk::error::Result;
@@ -170,7 +170,7 @@ impl BlockRim {
             file: None,
             steps: Vec::new(),
             pinches: Vec::new(),
-            ids: ids,
+            ids,
         };
         rim.pick(unit, surface, &rims)?;
         if rim.triangles.is_empty() {
@@ -242,15 +242,15 @@ impl BlockRim {
         self.star
             .at(a)
             .iter()
-            .any(|&n| self.triangles[n as usize].0.contains(&b))
+            .any(|&n| self.triangles[n.index()].0.contains(&b))
     }
 
     /// All triangles at pinched vertices, ascending by sorted ids.
     pub fn pinched(&self) -> Vec<SurfaceTriangle> {
         let at = |v: &Id| self.star.at(*v).iter().copied();
         let numbers = ascending(self.pinches.iter().flat_map(at));
-        let row = |n: u32| SurfaceTriangle {
-            corners: self.triangles[n as usize].0,
+        let row = |n: TriangleIndex| SurfaceTriangle {
+            corners: self.triangles[n.index()].0,
         };
         numbers.into_iter().map(row).collect()
     }

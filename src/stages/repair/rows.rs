@@ -1,6 +1,7 @@
 //! Rows exchanged between blocks to merge components.
 
-use crate::ids::Block;
+use crate::ids::{Block, Label};
+use crate::surface::parity::Turned;
 use crate::surface::star::Triangle;
 use outcrop_disk::spill::row;
 
@@ -15,7 +16,7 @@ row! {
         block: Block,
         /// `label << 1 | flip`: its label in that block, and 1 if it is turned against its ascending ids
         /// there.
-        label_flip: u32,
+        label_flip: Turned<Label>,
     }
     packed Above Above Rising Rising Above Above
 }
@@ -26,7 +27,7 @@ row! {
         /// Number of triangles.
         count: u32,
         /// The label.
-        label: u32,
+        label: Label,
     }
     unpacked
 }

@@ -12,7 +12,7 @@ use super::patch::Patch;
 use super::rows::{LabelRun, RimBits, SeenTriangle};
 use super::{OrientedTriangle, RepairOptions, RepairStats, SurfaceTriangle, bridges};
 use crate::blocks::Blocks;
-use crate::ids::Block;
+use crate::ids::{Block, GlobalLabel, TriangleIndex};
 use crate::located::Places;
 use crate::outside::Known;
 use crate::stitch::Stitched;
@@ -46,9 +46,9 @@ release!(StoredSurface: triangles, runs, rims, bridges);
 #[derive(Debug, Serialize, Deserialize)]
 struct Labels {
     /// For each block, the number of its first global label, and how many global labels it has.
-    globals: Vec<(u32, u32)>,
+    globals: Vec<(GlobalLabel, u32)>,
     /// For each global label its component, and the decision about it.
-    components: Vec<u32>,
+    components: Vec<GlobalLabel>,
     fates: Vec<Fate>,
 }
 
@@ -128,13 +128,13 @@ impl Surface<'_> {
                 component,
             };
             let before = to;
-            if label >= globals {
+            if label.get() >= globals {
                 triangles.copy_within(all, to);
                 to += count as usize;
-                kept.push(run(label << 1, before, to));
+                kept.push(run(label.get() << 1, before, to));
                 continue;
             }
-            let label = (first + label) as usize;
+            let label = first.of(label).index();
             let Fate { keep, turn } = labels.fates[label];
             if !keep {
                 continue;
@@ -147,7 +147,7 @@ impl Surface<'_> {
                 }
             }
             if to > before {
-                kept.push(run(labels.components[label] << 1 | 1, before, to));
+                kept.push(run(labels.components[label].get() << 1 | 1, before, to));
             }
         }
         triangles.truncate(to);
@@ -260,7 +260,7 @@ impl Build<'_> {
         workspace: &Workspace,
         stitched: &Stitched,
         stats: &mut RepairStats,
-    ) -> Result<(Vec<(u32, u32)>, u32)> {
+    ) -> Result<(Vec<(GlobalLabel, u32)>, u32)> {
         let count = self.blocks.count();
         let around = Around::open(stitched, self.blocks, workspace)?;
         let bytes = |b: usize| {
@@ -272,7 +272,7 @@ impl Build<'_> {
             let done = self.block(unit, &around);
             done.inspect(|_| unit.advance(1))
         };
-        let mut globals = vec![(0, 0); count];
+        let mut globals = vec![(GlobalLabel::default(), 0); count];
         workspace.units("repair: block", count, bytes, work, |block, (own, more)| {
             globals[block].1 = own;
             stats.add(&more);
@@ -280,7 +280,7 @@ impl Build<'_> {
         })?;
         let mut next = 0;
         for (first, own) in &mut globals {
-            *first = next;
+            *first = GlobalLabel::new(next);
             next += *own;
         }
         Ok((globals, next))
@@ -329,7 +329,7 @@ impl Build<'_> {
         let least = self.options.least();
         let fates: Vec<Fate> = local.iter().map(|s| judge(s, least, &mut stats)).collect();
         drop((sums, global, more));
-        let interior = |n: &&u32| !self.blocks.crossing(triangles[**n as usize]);
+        let interior = |n: &&TriangleIndex| !self.blocks.crossing(triangles[n.index()]);
         stats.bridges_removed = bridges.iter().filter(interior).count() as u64;
         self.send(unit, &triangles, &patch, &bridges)?;
         self.write(unit, triangles, &patch, &bridges, &fates)?;
@@ -344,18 +344,18 @@ impl Build<'_> {
         known: Option<&Known<'_>>,
         triangles: &[Triangle],
         patch: &Patch,
-        bridges: &[u32],
+        bridges: &[TriangleIndex],
     ) -> Vec<Sums> {
         let ids = self.blocks.ids(block);
         let mut sums = vec![Sums::default(); patch.labels as usize];
         let mut bridges = bridges.iter().peekable();
         for (number, t) in triangles.iter().enumerate() {
             let (label, flip) = constraint(patch.words[number]);
-            let sum = &mut sums[label as usize];
+            let sum = &mut sums[label.index()];
             if patch.open[number] {
                 sum.open();
             }
-            if bridges.next_if(|n| **n as usize == number).is_some() {
+            if bridges.next_if(|n| n.index() == number).is_some() {
                 continue;
             }
             if ids.contains(&t[0]) && ids.contains(&t[2]) {
@@ -377,7 +377,7 @@ impl Build<'_> {
         unit: &Unit<'_>,
         triangles: &[Triangle],
         patch: &Patch,
-        bridges: &[u32],
+        bridges: &[TriangleIndex],
     ) -> Result<()> {
         let block = unit.number();
         let ids = self.blocks.ids(block);
@@ -394,7 +394,7 @@ impl Build<'_> {
                 block: Block::at(block),
                 label_flip: patch.words[number],
             });
-            if bridges.binary_search(&(number as u32)).is_ok() {
+            if bridges.binary_search(&TriangleIndex::at(number)).is_ok() {
                 let to = |to| TriangleTo { to, triangle: t };
                 found.push(to(owner));
                 found.extend(self.blocks.visited(t).map(to));
@@ -410,19 +410,19 @@ impl Build<'_> {
         unit: &Unit<'_>,
         mut triangles: Vec<Triangle>,
         patch: &Patch,
-        bridges: &[u32],
+        bridges: &[TriangleIndex],
         fates: &[Fate],
     ) -> Result<()> {
         let mut runs: Vec<LabelRun> = Vec::new();
         let mut bridges = bridges.iter().peekable();
         let mut kept = 0;
         for number in 0..triangles.len() {
-            if bridges.next_if(|n| **n as usize == number).is_some() {
+            if bridges.next_if(|n| n.index() == number).is_some() {
                 continue;
             }
             let t = triangles[number];
             let (label, flip) = constraint(patch.words[number]);
-            let fate = match label.checked_sub(patch.global) {
+            let fate = match label.get().checked_sub(patch.global) {
                 Some(local) => fates[local as usize],
                 None => Fate::UNKNOWN,
             };

@@ -1,7 +1,7 @@
 //! The tests of a T12 triangle (paper, section 3.5): the combinatorial tests I to III and the geometric test.
 //! Test IV needs the components and is in [`super::insertion`].
 
-use crate::ids::{Id, Width};
+use crate::ids::{Id, TriangleIndex, Width};
 use crate::surface::star::{EDGES, Triangle, opposed, others};
 use outcrop_geom::Point;
 use outcrop_geom::triangle::normal;
@@ -10,13 +10,13 @@ use rustc_hash::FxHashMap;
 /// The mesh around the vertices of a triangle.
 pub trait Neighborhood {
     /// The star of `v`: for each of its triangles the number and the other two vertices, ascending.
-    fn star(&self, v: Id) -> impl Iterator<Item = (u32, [Id; 2])>;
+    fn star(&self, v: Id) -> impl Iterator<Item = (TriangleIndex, [Id; 2])>;
     /// The number of triangles at `v`.
     fn count(&self, v: Id) -> usize;
     /// The position of a vertex of a triangle of the mesh or of a candidate.
     fn position(&self, v: Id) -> Point;
     /// The position of `v`, a vertex of the triangle `number` of the mesh.
-    fn position_in(&self, _number: u32, v: Id) -> Point {
+    fn position_in(&self, _number: TriangleIndex, v: Id) -> Point {
         self.position(v)
     }
 }
@@ -39,7 +39,7 @@ const HUB: usize = 64;
 
 /// A triangle adjacent to a candidate: its number, and true if the candidate must be turned to be oriented
 /// like it.
-pub type Adjacent = (u32, bool);
+pub type Adjacent = (TriangleIndex, bool);
 
 /// Applies the tests I, II, III and G in this order. Returns the adjacent triangles by edge. `link` is a
 /// buffer.
@@ -90,11 +90,11 @@ fn at_edges(
     t: Triangle,
     mesh: &impl Neighborhood,
     hub: usize,
-) -> ([usize; 3], [Option<(u32, Id)>; 3]) {
-    let mut found: [Option<(u32, Id)>; 3] = [None; 3];
+) -> ([usize; 3], [Option<(TriangleIndex, Id)>; 3]) {
+    let mut found: [Option<(TriangleIndex, Id)>; 3] = [None; 3];
     let mut counts = [0usize; 3];
     // Counts triangle `number` at one end of an edge, with the other vertices `a` and `b`, if one is `end`.
-    let mut see = |edge: usize, number: u32, [a, b]: [Id; 2], end: Id| {
+    let mut see = |edge: usize, number: TriangleIndex, [a, b]: [Id; 2], end: Id| {
         if a == end || b == end {
             counts[edge] += 1;
             found[edge] = Some((number, if a == end { b } else { a }));
@@ -189,8 +189,9 @@ mod tests {
     }
 
     impl Neighborhood for Mesh {
-        fn star(&self, v: Id) -> impl Iterator<Item = (u32, [Id; 2])> {
+        fn star(&self, v: Id) -> impl Iterator<Item = (TriangleIndex, [Id; 2])> {
             let at = (0..)
+                .map(TriangleIndex::new)
                 .zip(&self.triangles)
                 .filter(move |(_, t)| t.contains(&v));
             at.map(move |(number, t)| {

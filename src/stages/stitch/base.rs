@@ -5,7 +5,7 @@ use super::BaseStats;
 use crate::blocks::Blocks;
 use crate::cells::CountedTriple;
 use crate::columns::{Direction, extreme};
-use crate::ids::{Block, Id};
+use crate::ids::{Block, Id, TriangleIndex};
 use crate::located::{Located, Places};
 use crate::surface::evidence::{Division, Evidence, UP, Witness};
 use crate::surface::orient::{BlockTriangles, Oriented, orient_inside};
@@ -177,7 +177,7 @@ impl Look<'_> {
             flagged.dedup();
             let interior = candidates.len();
             for &number in &flagged {
-                let triangle = triangles[number as usize];
+                let triangle = triangles[number.index()];
                 if self.blocks.crossing(triangle) {
                     let to = self.blocks.of(triangle[0]);
                     sent.push(TriangleTo { to, triangle });
@@ -188,7 +188,8 @@ impl Look<'_> {
             }
             found.flagged = (candidates.len() - interior) as u64;
             candidates.sort_unstable();
-            let (mut numbers, mut gone) = (0.., flagged.iter().peekable());
+            let numbers = (0..).map(TriangleIndex::new);
+            let (mut numbers, mut gone) = (numbers, flagged.iter().peekable());
             triangles.retain(|_| {
                 let number = numbers.next();
                 gone.next_if(|gone| number == Some(**gone)).is_none()
@@ -339,20 +340,20 @@ impl Look<'_> {
 struct Refusing {
     level: Level,
     link: Link,
-    kept: Vec<u32>,
+    kept: Vec<TriangleIndex>,
 }
 
 impl Refusing {
     /// Appends the triangles around `v` that it flags: at edges with more than two triangles, and beside a
     /// closed fan.
-    fn at(&mut self, v: Id, star: &Star, triangles: &[Triangle], flagged: &mut Vec<u32>) {
+    fn at(&mut self, v: Id, star: &Star, triangles: &[Triangle], flagged: &mut Vec<TriangleIndex>) {
         let around = star.at(v);
         if one_fan(self.level, v, around, triangles) {
             return;
         }
-        let triangle = |n: &u32| triangles[*n as usize];
+        let triangle = |n: &TriangleIndex| triangles[n.index()];
         let degree = |node: Id| around.iter().filter(|n| has(triangle(n), node)).count();
-        let crowded = |n: &u32| others(triangle(n), v).map(degree).iter().any(|d| *d > 2);
+        let crowded = |n: &TriangleIndex| others(triangle(n), v).map(degree).iter().any(|d| *d > 2);
         self.kept.clear();
         for n in around {
             if crowded(n) {
@@ -378,7 +379,7 @@ impl Refusing {
 
 /// True if the link of `v` is one path, one cycle, or empty: then nothing is flagged. False if this could not
 /// be established by the fast test.
-fn one_fan(level: Level, v: Id, around: &[u32], triangles: &[Triangle]) -> bool {
+fn one_fan(level: Level, v: Id, around: &[TriangleIndex], triangles: &[Triangle]) -> bool {
     if around.len() > MOST_EDGES {
         return false;
     }
@@ -386,7 +387,7 @@ fn one_fan(level: Level, v: Id, around: &[u32], triangles: &[Triangle]) -> bool 
     let mut ends = [[v.get(); MOST_EDGES]; 2];
     let [low, high] = &mut ends;
     for ((low, high), &n) in low.iter_mut().zip(high).zip(around) {
-        [*low, *high] = others(triangles[n as usize], v).map(Id::get);
+        [*low, *high] = others(triangles[n.index()], v).map(Id::get);
     }
     is_one_fan(level, &ends, around.len())
 }

@@ -5,35 +5,65 @@
 //! block, and in the whole mesh only if the pass across blocks confirms it. A *local* component lies in this
 //! block alone, so merging it with another one is final.
 
+use crate::ids::{Component, GlobalLabel, Label, TriangleIndex};
 use crate::surface::orient::OrientedSurface;
-use crate::surface::parity::{OrientationConstraint, ParitySets, constraint, word};
+use crate::surface::parity::{OrientationConstraint, ParitySets, Turned, constraint, word};
 use crate::surface::star::Triangle;
 use outcrop_disk::spill::row;
 use outcrop_disk::workspace::memory::bytes_of;
 use rustc_hash::FxHashMap;
-
-/// Stands for a missing global label.
-pub const NOTHING: u32 = u32::MAX;
 
 row! {
     /// An inserted triangle that connects global components.
     pub struct Merge {
         /// Ids, ascending.
         triangle: Triangle,
-        /// `label << 1 | flip` of the components, or [`NOTHING`].
-        constraints: [u32; 3],
+        /// `label << 1 | flip` of the components, or [`Turned::NONE`].
+        constraints: [Turned<GlobalLabel>; 3],
     }
     packed Above Above Above Above Above Above
+}
+
+/// The component of a triangle for other blocks, in a word: `number << 2 | local << 1 | flip`.
+#[derive(
+    Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord, bytemuck::Pod, bytemuck::Zeroable,
+)]
+#[repr(transparent)]
+pub struct Reference(u32);
+
+/// Whose component a [`Reference`] names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Whose {
+    /// A component of the block alone.
+    Local(Component),
+    /// A component that may lie in several blocks.
+    Global(GlobalLabel),
+}
+
+impl Reference {
+    fn new(number: u32, local: bool, flip: bool) -> Self {
+        Self(number << 2 | u32::from(local) << 1 | u32::from(flip))
+    }
+
+    /// The component, and true if the triangle is turned against it.
+    pub fn parts(self) -> (Whose, bool) {
+        let number = self.0 >> 2;
+        let whose = match self.0 >> 1 & 1 {
+            1 => Whose::Local(Component::new(number)),
+            _ => Whose::Global(GlobalLabel::new(number)),
+        };
+        (whose, self.0 & 1 == 1)
+    }
 }
 
 /// The components of the base in a block, numbered in the order of first use. All labels of a set with a
 /// crossing triangle are one component; every other label is a component of its own.
 pub struct BaseComponents<'a> {
     surface: &'a OrientedSurface,
-    of_root: FxHashMap<u32, u32>,
-    of_label: Vec<OrientationConstraint>,
-    /// Global label of each component, or [`NOTHING`].
-    global: Vec<u32>,
+    of_root: FxHashMap<GlobalLabel, Component>,
+    of_label: Vec<OrientationConstraint<Component>>,
+    /// Global label of each component, or [`GlobalLabel::NONE`].
+    global: Vec<GlobalLabel>,
 }
 
 impl<'a> BaseComponents<'a> {
@@ -48,38 +78,42 @@ impl<'a> BaseComponents<'a> {
         };
         let labels = surface.labels[block];
         components.of_label.reserve(labels as usize);
-        for label in 0..labels {
-            let component = if label < globals {
-                components.of_global(first + label)
+        for label in (0..labels).map(Label::new) {
+            let component = if label.get() < globals {
+                components.of_global(first.of(label))
             } else {
-                components.global.push(NOTHING);
-                (components.global.len() as u32 - 1, false)
+                components.global.push(GlobalLabel::NONE);
+                (Component::at(components.global.len() - 1), false)
             };
             components.of_label.push(component);
         }
         components
     }
 
-    fn of_global(&mut self, label: u32) -> OrientationConstraint {
+    fn of_global(&mut self, label: GlobalLabel) -> OrientationConstraint<Component> {
         let (root, flip) = self.surface.sets.look(label);
-        let crosses = self.surface.crosses[root as usize];
+        let crosses = self.surface.crosses[root.index()];
         let component = *self.of_root.entry(root).or_insert_with(|| {
-            self.global.push(if crosses { root } else { NOTHING });
-            self.global.len() as u32 - 1
+            self.global
+                .push(if crosses { root } else { GlobalLabel::NONE });
+            Component::at(self.global.len() - 1)
         });
         (component, flip)
     }
 
     /// The component of an interior triangle with `label << 1 | flip`, and true if the triangle is turned
     /// against it.
-    pub fn interior(&self, label_flip: u32) -> OrientationConstraint {
+    pub fn interior(&self, label_flip: Turned<Label>) -> OrientationConstraint<Component> {
         let (label, turned) = constraint(label_flip);
-        let (component, flip) = self.of_label[label as usize];
+        let (component, flip) = self.of_label[label.index()];
         (component, flip ^ turned)
     }
 
     /// The same for a crossing triangle, whose label is global.
-    pub fn crossing(&mut self, label_flip: u32) -> OrientationConstraint {
+    pub fn crossing(
+        &mut self,
+        label_flip: Turned<GlobalLabel>,
+    ) -> OrientationConstraint<Component> {
         let (label, turned) = constraint(label_flip);
         let (component, flip) = self.of_global(label);
         (component, flip ^ turned)
@@ -90,20 +124,20 @@ impl<'a> BaseComponents<'a> {
 #[derive(Default)]
 pub struct BlockComponents {
     /// For each triangle, its component when it was added, and true if it is turned against it.
-    of: Vec<OrientationConstraint>,
+    of: Vec<OrientationConstraint<Component>>,
     /// Final merges of components.
-    merged: ParitySets,
+    merged: ParitySets<Component>,
     /// All merges valid in this block, including tentative ones.
-    pub joined: ParitySets,
-    /// Global label of each component, or [`NOTHING`].
-    global: Vec<u32>,
+    pub joined: ParitySets<Component>,
+    /// Global label of each component, or [`GlobalLabel::NONE`].
+    global: Vec<GlobalLabel>,
     /// Tentative merges, in the order of insertion.
     pub tentative: Vec<Merge>,
 }
 
 impl BlockComponents {
     /// The components of the base; `of` gives that of each triangle.
-    pub fn new(base: BaseComponents<'_>, of: Vec<OrientationConstraint>) -> Self {
+    pub fn new(base: BaseComponents<'_>, of: Vec<OrientationConstraint<Component>>) -> Self {
         Self {
             of,
             merged: ParitySets::new(base.global.len()),
@@ -119,26 +153,24 @@ impl BlockComponents {
     }
 
     /// The current component of a triangle, and true if the triangle is turned against it.
-    pub fn find(&mut self, number: u32) -> OrientationConstraint {
-        let (component, flip) = self.of[number as usize];
+    pub fn find(&mut self, number: TriangleIndex) -> OrientationConstraint<Component> {
+        let (component, flip) = self.of[number.index()];
         let (root, up) = self.merged.find(component);
         (root, flip ^ up)
     }
 
-    /// The same in a form that other blocks understand: the word `number << 2 | local << 1 | flip`, where
-    /// `number` is a number within the block if it is local, else the global label.
-    pub fn reference(&mut self, number: u32) -> u32 {
+    /// The same in a form that other blocks understand.
+    pub fn reference(&mut self, number: TriangleIndex) -> Reference {
         let (root, flip) = self.find(number);
-        let component = match self.global[root as usize] {
-            NOTHING => word((root, true)),
-            label => word((label, false)),
-        };
-        word((component, flip))
+        match self.global[root.index()] {
+            GlobalLabel::NONE => Reference::new(root.get(), true, flip),
+            label => Reference::new(label.get(), false, flip),
+        }
     }
 
     /// Adds a triangle at which the components of `constraints` meet. A local component is merged with its
     /// neighbour; global ones are merged tentatively.
-    pub fn insert(&mut self, t: Triangle, constraints: &[OrientationConstraint]) {
+    pub fn insert(&mut self, t: Triangle, constraints: &[OrientationConstraint<Component>]) {
         let mut current = constraints[0];
         for &(next, flip) in constraints {
             let (a, up_a) = self.merged.find(current.0);
@@ -150,9 +182,9 @@ impl BlockComponents {
             let next = (b, flip ^ up_b);
             let turned = current.1 ^ next.1;
             // The global root is kept, or the first one if none is global.
-            if self.global[b as usize] == NOTHING {
+            if self.global[b.index()] == GlobalLabel::NONE {
                 self.merged.join(a, b, turned);
-            } else if self.global[a as usize] == NOTHING {
+            } else if self.global[a.index()] == GlobalLabel::NONE {
                 self.merged.join(b, a, turned);
                 current = next;
             }
@@ -164,14 +196,14 @@ impl BlockComponents {
     }
 
     /// Records a tentative merge if global components meet at `t`.
-    fn note_tentative(&mut self, t: Triangle, constraints: &[OrientationConstraint]) {
-        let mut words = [NOTHING; 3];
+    fn note_tentative(&mut self, t: Triangle, constraints: &[OrientationConstraint<Component>]) {
+        let mut words = [Turned::NONE; 3];
         let mut count = 0;
         for &(component, flip) in constraints {
             let (root, up) = self.merged.find(component);
-            let label = self.global[root as usize];
+            let label = self.global[root.index()];
             let word = word((label, flip ^ up));
-            if label != NOTHING && !words[..count].contains(&word) {
+            if label != GlobalLabel::NONE && !words[..count].contains(&word) {
                 words[count] = word;
                 count += 1;
             }

@@ -4,7 +4,7 @@
 
 use super::admissibility::{Neighborhood, Refusal, examine};
 use super::stats::InsertStats;
-use crate::ids::Id;
+use crate::ids::{Id, Number, TriangleIndex};
 use crate::surface::parity::{OrientationConstraint, ParitySets};
 use crate::surface::star::Triangle;
 use outcrop_disk::spill::row;
@@ -12,15 +12,17 @@ use outcrop_geom::{Point, distance2};
 
 /// The mesh around candidates, which grows as they are inserted.
 pub trait Mesh: Neighborhood {
+    /// What components are numbered by.
+    type Part: Number;
     /// Time of the last insertion of a triangle at a vertex of a candidate; 0 if there was none.
     fn changed(&self, v: Id) -> u32;
     /// The component of a triangle of the mesh, and true if the triangle is turned against it.
-    fn component(&mut self, number: u32) -> OrientationConstraint;
+    fn component(&mut self, number: TriangleIndex) -> OrientationConstraint<Self::Part>;
     /// The merged components, for test IV.
-    fn components(&mut self) -> &mut ParitySets;
+    fn components(&mut self) -> &mut ParitySets<Self::Part>;
     /// Adds a triangle at the time `now`. There is at least one constraint, and the components of
     /// `constraints` have been merged.
-    fn insert(&mut self, t: Triangle, constraints: &[OrientationConstraint], now: u32);
+    fn insert(&mut self, t: Triangle, constraints: &[OrientationConstraint<Self::Part>], now: u32);
 }
 
 /// Tries the candidates, ascending, in rounds until a round inserts none. The candidates left in the list

@@ -4,11 +4,11 @@
 use super::Insertion;
 use super::admissibility::Neighborhood;
 use super::base::Base;
-use super::components::{BaseComponents, BlockComponents, Merge};
+use super::components::{BaseComponents, BlockComponents, Merge, Reference};
 use super::insertion::{Candidate, CandidateRow, Mesh, insert_candidates};
 use super::stats::InsertStats;
 use crate::cells::CountedTriple;
-use crate::ids::{Block, Id, Ids};
+use crate::ids::{Block, Component, Id, Ids, TriangleIndex};
 use crate::located::Located;
 use crate::surface::parity::{OrientationConstraint, ParitySets};
 use crate::surface::rows::{LabelledTo, LabelledTriangle, TriangleRow, TriangleTo};
@@ -25,7 +25,7 @@ row! {
         /// Ids, ascending.
         triangle: Triangle,
         /// See [`BlockComponents::reference`].
-        component: u32,
+        component: Reference,
     }
     packed Above Rising Rising Above
 }
@@ -146,7 +146,7 @@ struct BlockWork {
     mesh: Vec<Triangle>,
     /// For each vertex of a candidate (*active* vertices), the number and the other two vertices, ascending,
     /// of each triangle there.
-    stars: ByVertex<(u32, [Id; 2])>,
+    stars: ByVertex<(TriangleIndex, [Id; 2])>,
     /// For each vertex of the block, the time of the last insertion there.
     changed: Vec<u32>,
     /// The interior triangles of the base that touch a candidate or a crossing triple, then those of the
@@ -167,7 +167,7 @@ struct BlockWork {
 }
 
 impl Neighborhood for BlockWork {
-    fn star(&self, v: Id) -> impl Iterator<Item = (u32, [Id; 2])> {
+    fn star(&self, v: Id) -> impl Iterator<Item = (TriangleIndex, [Id; 2])> {
         self.stars.at(v).iter().copied()
     }
 
@@ -181,19 +181,21 @@ impl Neighborhood for BlockWork {
 }
 
 impl Mesh for BlockWork {
+    type Part = Component;
+
     fn changed(&self, v: Id) -> u32 {
         self.changed[self.ids.place(v)]
     }
 
-    fn component(&mut self, number: u32) -> OrientationConstraint {
+    fn component(&mut self, number: TriangleIndex) -> OrientationConstraint<Component> {
         self.components.find(number)
     }
 
-    fn components(&mut self) -> &mut ParitySets {
+    fn components(&mut self) -> &mut ParitySets<Component> {
         &mut self.components.joined
     }
 
-    fn insert(&mut self, t: Triangle, constraints: &[OrientationConstraint], now: u32) {
+    fn insert(&mut self, t: Triangle, constraints: &[OrientationConstraint<Component>], now: u32) {
         self.components.insert(t, constraints);
         self.enter(t);
         for v in t {
@@ -323,7 +325,7 @@ impl BlockWork {
 
     /// Adds a triangle with the next number.
     fn enter(&mut self, t: Triangle) {
-        let number = self.triangles.len() as u32;
+        let number = TriangleIndex::at(self.triangles.len());
         self.triangles.push(t);
         for v in t {
             self.stars.push(v, (number, others(t, v)));
@@ -379,7 +381,7 @@ impl BlockWork {
             let triangle = self.triangles[number];
             let mut slots = triangle.iter().map(|v| self.ids.place(*v));
             if slots.any(|v| context[v]) {
-                let component = self.components.reference(number as u32);
+                let component = self.components.reference(TriangleIndex::at(number));
                 around.push(TriangleIn {
                     triangle,
                     component,

@@ -2,12 +2,12 @@
 
 use super::Insertion;
 use super::admissibility::Neighborhood;
-use super::components::NOTHING;
+use super::components::Whose;
 use super::deferred::Deferred;
 use super::insertion::{Candidate, Mesh};
 use super::interior::{TriangleIn, VertexAt};
-use crate::ids::{Block, Id, Ids};
-use crate::surface::parity::{OrientationConstraint, ParitySets, constraint, word};
+use crate::ids::{Block, Component, GlobalLabel, Id, Ids, TriangleIndex};
+use crate::surface::parity::{OrientationConstraint, ParitySets, Turned, constraint, word};
 use crate::surface::rows::{LabelledTo, TriangleTo};
 use crate::surface::star::{Triangle, others};
 use outcrop_disk::error::Result;
@@ -21,7 +21,7 @@ use rustc_hash::FxHashMap;
 #[derive(Default)]
 struct VertexStar {
     position: Point,
-    triangles: Vec<u32>,
+    triangles: Vec<TriangleIndex>,
     /// Time of the last insertion.
     changed: u32,
 }
@@ -31,8 +31,8 @@ row! {
     pub struct Change {
         /// Ids, ascending.
         triangle: Triangle,
-        /// `label << 1 | flip`; [`NOTHING`] if the triangle was removed.
-        label_flip: u32,
+        /// `label << 1 | flip`; [`Turned::NONE`] if the triangle was removed.
+        label_flip: Turned<GlobalLabel>,
         /// Positions of the corners.
         at: [Point; 3],
     }
@@ -48,14 +48,14 @@ const TRIANGLE: u64 = 80;
 pub struct Surroundings<'a> {
     pub insertion: Insertion<'a>,
     /// The merged labels of the whole mesh.
-    sets: ParitySets,
+    sets: ParitySets<GlobalLabel>,
     /// Labels of the local components used so far, by block and number.
-    locals: FxHashMap<(Block, u32), u32>,
+    locals: FxHashMap<(Block, Component), GlobalLabel>,
     /// The triangles at vertices of candidates.
     triangles: Vec<Change>,
     stars: FxHashMap<Id, VertexStar>,
     /// Triangles inserted in this turn.
-    inserted: Vec<u32>,
+    inserted: Vec<TriangleIndex>,
     pub changes: Deferred<Change>,
     reserved: Vec<Reservation>,
     /// The memory reported by turns that do not report it to a unit.
@@ -63,12 +63,12 @@ pub struct Surroundings<'a> {
 }
 
 impl Neighborhood for Surroundings<'_> {
-    fn star(&self, v: Id) -> impl Iterator<Item = (u32, [Id; 2])> {
+    fn star(&self, v: Id) -> impl Iterator<Item = (TriangleIndex, [Id; 2])> {
         let numbers = self.stars.get(&v).map(|star| star.triangles.iter());
         numbers
             .into_iter()
             .flatten()
-            .map(move |&n| (n, others(self.triangles[n as usize].triangle, v)))
+            .map(move |&n| (n, others(self.triangles[n.index()].triangle, v)))
     }
 
     fn count(&self, v: Id) -> usize {
@@ -79,27 +79,34 @@ impl Neighborhood for Surroundings<'_> {
         self.stars[&v].position
     }
 
-    fn position_in(&self, number: u32, v: Id) -> Point {
-        let t = &self.triangles[number as usize];
+    fn position_in(&self, number: TriangleIndex, v: Id) -> Point {
+        let t = &self.triangles[number.index()];
         t.at[t.triangle.iter().position(|w| *w == v).unwrap_or(0)]
     }
 }
 
 impl Mesh for Surroundings<'_> {
+    type Part = GlobalLabel;
+
     fn changed(&self, v: Id) -> u32 {
         self.stars.get(&v).map_or(0, |star| star.changed)
     }
 
-    fn component(&mut self, number: u32) -> OrientationConstraint {
-        constraint(self.triangles[number as usize].label_flip)
+    fn component(&mut self, number: TriangleIndex) -> OrientationConstraint<GlobalLabel> {
+        constraint(self.triangles[number.index()].label_flip)
     }
 
-    fn components(&mut self) -> &mut ParitySets {
+    fn components(&mut self) -> &mut ParitySets<GlobalLabel> {
         &mut self.sets
     }
 
-    fn insert(&mut self, t: Triangle, constraints: &[OrientationConstraint], now: u32) {
-        let number = self.triangles.len() as u32;
+    fn insert(
+        &mut self,
+        t: Triangle,
+        constraints: &[OrientationConstraint<GlobalLabel>],
+        now: u32,
+    ) {
+        let number = TriangleIndex::at(self.triangles.len());
         self.triangles.push(Change {
             triangle: t,
             label_flip: word(constraints[0]),
@@ -276,7 +283,7 @@ impl<'a> Surroundings<'a> {
         crossing.retain(|t| touches(t.triangle));
         let (mut changes, mut gone) = (self.changes.get(unit, block)?, Vec::new());
         changes.retain(|change| {
-            let is_gone = change.label_flip == NOTHING;
+            let is_gone = change.label_flip == Turned::NONE;
             if is_gone {
                 gone.push(change.triangle);
             }
@@ -296,19 +303,19 @@ impl<'a> Surroundings<'a> {
     /// Adds the triangles found in a block.
     fn enter_all(&mut self, found: &Found, positions: &Positions, block: Block) {
         self.triangles.reserve(found.count());
-        let located = |triangle: Triangle, label_flip: u32| Change {
+        let located = |triangle: Triangle, label_flip: Turned<GlobalLabel>| Change {
             triangle,
             label_flip,
             at: triangle.map(|v| positions.at(v)),
         };
         for row in &found.interior {
-            let (component, flip) = constraint(row.component);
-            let label = match constraint(component) {
-                (number, true) => {
-                    let local = self.locals.entry((block, number));
+            let (whose, flip) = row.component.parts();
+            let label = match whose {
+                Whose::Local(component) => {
+                    let local = self.locals.entry((block, component));
                     *local.or_insert_with(|| self.sets.push())
                 }
-                (label, false) => label,
+                Whose::Global(label) => label,
             };
             self.enter(located(row.triangle, word((label, flip))), block);
         }
@@ -322,7 +329,7 @@ impl<'a> Surroundings<'a> {
 
     /// Adds a triangle to the stars of candidates' vertices in `block`.
     fn enter(&mut self, entry: Change, block: Block) {
-        let number = self.triangles.len() as u32;
+        let number = TriangleIndex::at(self.triangles.len());
         self.triangles.push(entry);
         for v in entry.triangle {
             if self.insertion.blocks.of(v) == block
@@ -363,18 +370,18 @@ impl<'a> Surroundings<'a> {
     ) -> Result<Vec<TriangleTo>> {
         let mut sent = Vec::with_capacity(2 * self.inserted.len());
         for &number in &self.inserted {
-            let t = self.triangles[number as usize].triangle;
+            let t = self.triangles[number.index()].triangle;
             let first = self.insertion.blocks.of(t[0]);
             let all = std::iter::once(first).chain(self.insertion.blocks.visited(t));
             sent.extend(all.map(|block| (block, number)));
         }
         sent.sort_unstable();
-        let entry = |number: u32| self.triangles[number as usize];
+        let entry = |number: TriangleIndex| self.triangles[number.index()];
         for part in sent.chunk_by(|a, b| a.0 == b.0).filter(|p| later(p[0].0)) {
             let rows: Vec<_> = part.iter().map(|(_, n)| entry(*n)).collect();
             self.changes.send(unit, part[0].0.index(), &rows)?;
         }
-        let with_block = |&(to, number): &(Block, u32)| TriangleTo {
+        let with_block = |&(to, number): &(Block, TriangleIndex)| TriangleTo {
             to,
             triangle: entry(number).triangle,
         };
@@ -389,14 +396,14 @@ impl<'a> Surroundings<'a> {
         let (mut gone, mut noted) = (Vec::new(), Vec::new());
         for merge in self.insertion.interior.merges.get(unit, block)? {
             let triangle = merge.triangle;
-            let words = merge.constraints.into_iter().filter(|w| *w != NOTHING);
-            let constraints: Vec<OrientationConstraint> = words.map(constraint).collect();
+            let words = merge.constraints.into_iter().filter(|w| *w != Turned::NONE);
+            let constraints: Vec<OrientationConstraint<_>> = words.map(constraint).collect();
             if !self.sets.merge(&constraints) {
                 let to = Block::at(block);
                 gone.push(TriangleTo { to, triangle });
                 noted.push(Change {
                     triangle,
-                    label_flip: NOTHING,
+                    label_flip: Turned::NONE,
                     at: [[0; 3]; 3],
                 });
                 self.take_out(triangle);
@@ -412,7 +419,7 @@ impl<'a> Surroundings<'a> {
                 let triangles = &self.triangles;
                 // No test depends on the order of the list.
                 star.triangles
-                    .retain(|n| triangles[*n as usize].triangle != t);
+                    .retain(|n| triangles[n.index()].triangle != t);
             }
         }
     }

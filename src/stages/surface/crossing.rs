@@ -2,12 +2,12 @@
 
 use super::crossing_edges::CrossingEdges;
 use super::orient::{OrientedInside, OrientedSurface, label_bytes};
-use super::parity::{ParitySets, word};
+use super::parity::{ParitySets, Turned, word};
 use super::rows::{LabelledTo, Relation, TriangleTo, interior_constraints};
 use super::settle::settle;
 use super::star::Triangle;
 use crate::blocks::Blocks;
-use crate::ids::Block;
+use crate::ids::{Block, GlobalLabel};
 use outcrop_disk::error::Result;
 use outcrop_disk::spill::{Inbox, Shuffle};
 use outcrop_disk::workspace::Unit;
@@ -29,7 +29,7 @@ impl OrientedInside {
         let mut globals = Vec::with_capacity(self.labels.len());
         let mut next = 0u32;
         for (global, _) in &self.labels {
-            globals.push((next, *global));
+            globals.push((GlobalLabel::new(next), *global));
             next += global;
         }
         let _held = unit.reserve("labels", label_bytes(next as usize))?;
@@ -110,10 +110,10 @@ fn orient_crossing(
     }
     base.sets.flatten();
     // The marks were set on labels; they apply to whole sets.
-    for label in 0..base.sets.len() as u32 {
-        if base.crosses[label as usize] {
-            let (root, _) = base.sets.find(label);
-            base.crosses[root as usize] = true;
+    for label in 0..base.sets.len() {
+        if base.crosses[label] {
+            let (root, _) = base.sets.find(GlobalLabel::at(label));
+            base.crosses[root.index()] = true;
         }
     }
     Ok(())
@@ -126,7 +126,7 @@ fn orient_one(
     relations: &[Relation],
     group: usize,
     edges: &CrossingEdges,
-) -> Option<u32> {
+) -> Option<Turned<GlobalLabel>> {
     let interior = interior_constraints(&base.globals, relations, group, t);
     let before = edges.adjacent(t).map(|(constraint, ..)| constraint);
     let constraints: Vec<_> = interior.map(|(c, _)| c).chain(before).collect();
@@ -140,6 +140,6 @@ fn orient_one(
             (base.sets.push(), false)
         }
     };
-    base.crosses[label as usize] = true;
+    base.crosses[label.index()] = true;
     Some(word((label, flip)))
 }

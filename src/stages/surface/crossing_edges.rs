@@ -1,9 +1,9 @@
 //! The edges of crossing triangles, during the pass over these triangles in ascending order.
 
-use super::parity::{OrientationConstraint, constraint};
+use super::parity::{OrientationConstraint, Turned, constraint};
 use super::star::{EDGES, Triangle, opposed};
 use crate::blocks::Blocks;
-use crate::ids::{Block, Id};
+use crate::ids::{Block, GlobalLabel, Id};
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::memory::{Reservation, table_bytes};
@@ -16,7 +16,7 @@ const EDGE: u64 = 128 + LIST;
 const LIST: u64 = 128;
 
 /// A triangle, `label << 1 | flip`, and its unit normal if it is needed.
-type Entry = (Triangle, u32, [f32; 3]);
+type Entry = (Triangle, Turned<GlobalLabel>, [f32; 3]);
 
 /// The triangles so far at edges that later triangles may share. Crossing triangles are few and scattered, so
 /// their edges are in a hash table. Edges that no later triangle can share are removed block by block.
@@ -41,7 +41,7 @@ impl CrossingEdges {
     }
 
     /// Adds a triangle with `label << 1 | flip`; room must have been reserved.
-    pub(super) fn put(&mut self, t: Triangle, word: u32, normal: [f64; 3]) {
+    pub(super) fn put(&mut self, t: Triangle, word: Turned<GlobalLabel>, normal: [f64; 3]) {
         let normal = normal.map(|x| x as f32);
         for (a, b, ..) in EDGES {
             let at = self.edges.entry((t[a], t[b])).or_default();
@@ -54,7 +54,7 @@ impl CrossingEdges {
     pub(super) fn adjacent(
         &self,
         t: Triangle,
-    ) -> impl Iterator<Item = (OrientationConstraint, bool, [f64; 3])> + '_ {
+    ) -> impl Iterator<Item = (OrientationConstraint<GlobalLabel>, bool, [f64; 3])> + '_ {
         EDGES.into_iter().flat_map(move |(a, b, ..)| {
             let at = self.edges.get(&(t[a], t[b])).into_iter().flatten();
             at.map(move |&(other, word, normal)| {
@@ -79,6 +79,7 @@ impl CrossingEdges {
 mod tests {
     use super::*;
     use crate::ids::triangle;
+    use crate::surface::parity::word;
     use outcrop_disk::error::Error;
 
     #[test]
@@ -94,8 +95,12 @@ mod tests {
                 .collect();
             edges.make_room(new.len()).unwrap();
             for t in new {
-                edges.put(t, 2 * group, [0.0; 3]);
-                assert!(edges.adjacent(t).any(|(found, ..)| found == (group, true)));
+                edges.put(t, word((GlobalLabel::new(group), false)), [0.0; 3]);
+                assert!(
+                    edges
+                        .adjacent(t)
+                        .any(|(found, ..)| found == (GlobalLabel::new(group), true))
+                );
             }
             edges.end(group as usize, blocks);
             let kept = edges.edges.keys().all(|(low, _)| low.get() >= first + 10);

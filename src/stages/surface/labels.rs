@@ -6,7 +6,7 @@ use super::patches::SharedEdge;
 use super::rows::{LabelledTriangle, PairSum, Relation, Seam, Upward, words};
 use super::star::{EDGES, EdgesUp, Triangle, opposed};
 use crate::blocks::Blocks;
-use crate::ids::{Block, Ids};
+use crate::ids::{Block, Ids, Label, TriangleIndex};
 use outcrop_disk::workspace::memory::bytes_of;
 
 /// The labels of a block; the rows are described at [`super::orient::OrientedSurface`] and
@@ -47,7 +47,7 @@ pub(super) fn orient_block(
     let mut constraints = Vec::new();
     let mut mobius = 0;
     for (number, &t) in inner.iter().enumerate() {
-        let number = number as u32;
+        let number = TriangleIndex::at(number);
         // The adjacent triangles agree and are joined, or this triangle is removed.
         constraints.clear();
         adjacent(t, &edges, inner, &ids, |other, flip| {
@@ -79,16 +79,16 @@ pub(super) fn orient_block(
 #[derive(Default)]
 pub(super) struct Connections {
     /// One triangle of each set that may be connected with the rest of the cloud, in the order of labels.
-    pub first: Vec<u32>,
+    pub first: Vec<TriangleIndex>,
     /// A crossing triangle, an interior one at one of its edges, true if one must be turned against the
     /// other, and the weight of the edge.
-    pub relations: Vec<(Triangle, u32, bool, i64)>,
+    pub relations: Vec<(Triangle, TriangleIndex, bool, i64)>,
     /// One triangle of each of two sets, and the signed sum of weights between the sets, relative to these
     /// triangles.
-    pub pairs: Vec<(u32, u32, i64)>,
+    pub pairs: Vec<(TriangleIndex, TriangleIndex, i64)>,
     /// A triangle of a set, and the evidence that the set faces up, relative to the orientation of this
     /// triangle.
-    pub ups: Vec<(u32, i64)>,
+    pub ups: Vec<(TriangleIndex, i64)>,
     /// Edges between sets.
     pub seams: Vec<SharedEdge>,
 }
@@ -96,21 +96,20 @@ pub(super) struct Connections {
 /// Numbers the labels of the sets; those that may be connected with the rest of the cloud come first.
 pub(super) fn number_labels(
     inner: &[Triangle],
-    kept: &[u32],
+    kept: &[TriangleIndex],
     connections: Connections,
-    sets: &mut ParitySets,
+    sets: &mut ParitySets<TriangleIndex>,
     blocks: Blocks,
     block: usize,
     mobius: u64,
 ) -> OrientedBlock {
-    const NONE: u32 = u32::MAX;
-    let mut label_of = vec![NONE; inner.len()];
+    let mut label_of = vec![Label::NONE; inner.len()];
     let mut labels = 0;
-    let mut find = |triangle: u32| {
+    let mut find = |triangle: TriangleIndex| {
         let (root, turned) = sets.find(triangle);
-        let label = &mut label_of[root as usize];
-        if *label == NONE {
-            *label = labels;
+        let label = &mut label_of[root.index()];
+        if *label == Label::NONE {
+            *label = Label::new(labels);
             labels += 1;
         }
         (*label, turned, labels)
@@ -139,7 +138,7 @@ pub(super) fn number_labels(
     let mut ups = Vec::with_capacity(connections.ups.len());
     for (a, up) in connections.ups {
         let (label, turned, _) = find(a);
-        if label < global {
+        if label.get() < global {
             let evidence = words(signed(turned, up));
             ups.push(Upward { label, evidence });
         }
@@ -148,11 +147,11 @@ pub(super) fn number_labels(
     for &number in kept {
         let (label, turned, _) = find(number);
         interior.push(LabelledTriangle {
-            triangle: inner[number as usize],
+            triangle: inner[number.index()],
             label_flip: word((label, turned)),
         });
     }
-    let place = |n: u32| kept.partition_point(|k| *k < n) as u32;
+    let place = |n| TriangleIndex::at(kept.partition_point(|k| *k < n));
     let seam = |edge: &SharedEdge| Seam {
         a: place(edge.a),
         b_flip: word((place(edge.b), edge.flip)),
@@ -178,13 +177,13 @@ pub(super) fn adjacent(
     edges: &EdgesUp,
     triangles: &[Triangle],
     ids: &Ids,
-    mut each: impl FnMut(u32, bool),
+    mut each: impl FnMut(TriangleIndex, bool),
 ) {
     for (a, b, ..) in EDGES {
         let (low, high) = (t[a], t[b]);
         if ids.contains(&high) {
             for n in edges.at_edge(low, high) {
-                each(n, opposed(t, triangles[n as usize], low, high));
+                each(n, opposed(t, triangles[n.index()], low, high));
             }
         }
     }

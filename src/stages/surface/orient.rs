@@ -10,7 +10,7 @@ use super::rows::{
 use super::star::Triangle;
 use super::weigh::weigh_block;
 use crate::blocks::Blocks;
-use crate::ids::Block;
+use crate::ids::{Block, GlobalLabel};
 use outcrop_disk::error::Result;
 use outcrop_disk::spill::{Inbox, Shuffle, Table, release};
 use outcrop_disk::workspace::memory::{Reservation, bytes_of};
@@ -28,11 +28,11 @@ pub struct OrientedSurface {
     /// Crossing triangles, once for each block they touch; labels are global.
     pub sent: Shuffle<LabelledTo>,
     /// For each block, the global label of its label 0 and the number of labels that are global.
-    pub globals: Vec<(u32, u32)>,
+    pub globals: Vec<(GlobalLabel, u32)>,
     /// For each block, the number of its labels.
     pub labels: Vec<u32>,
     /// The merged global labels, with relative orientations.
-    pub sets: ParitySets,
+    pub sets: ParitySets<GlobalLabel>,
     /// For each root, true if its component has a crossing triangle.
     pub crosses: Vec<bool>,
     /// For each block, the edges between triangles of different labels, if there is evidence. If the two
@@ -227,14 +227,17 @@ impl OrientedSurface {
         // Labels at seams are global.
         let turned = |t: &LabelledTriangle| {
             let (label, flip) = constraint(t.label_flip);
-            debug_assert!(label < globals, "a seam at a label of the block alone");
-            self.sets.look(first + label).1 ^ flip
+            debug_assert!(
+                label.get() < globals,
+                "a seam at a label of the block alone"
+            );
+            self.sets.look(first.of(label)).1 ^ flip
         };
         let mut gone = 0;
         let mut cut = vec![false; interior.len()];
         for Seam { a, b_flip } in seams.get(unit, block)? {
             let (b, flip) = constraint(b_flip);
-            let (a, b) = (a as usize, b as usize);
+            let (a, b) = (a.index(), b.index());
             if !cut[a] && !cut[b] && turned(&interior[a]) ^ turned(&interior[b]) != flip {
                 cut[b] = true;
                 gone += 1;

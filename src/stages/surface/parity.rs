@@ -1,21 +1,66 @@
 //! Union–find in which every member has an orientation relative to its set.
 
+use crate::ids::Number;
+use serde::{Deserialize, Serialize};
+use std::marker::PhantomData;
+
 /// The constraint of an adjacent triangle on the orientation of another one: a label, and true if the other
 /// triangle must be turned against this label.
-pub type OrientationConstraint = (u32, bool);
+pub type OrientationConstraint<T> = (T, bool);
+
+/// A constraint in a word, `label << 1 | flip`.
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    Default,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Serialize,
+    Deserialize,
+    bytemuck::Pod,
+    bytemuck::Zeroable,
+)]
+#[serde(transparent)]
+#[repr(transparent)]
+pub struct Turned<T> {
+    word: u32,
+    of: PhantomData<T>,
+}
+
+impl<T> Turned<T> {
+    /// Stands for no label.
+    pub const NONE: Self = Self::from_word(u32::MAX);
+
+    const fn from_word(word: u32) -> Self {
+        Self {
+            word,
+            of: PhantomData,
+        }
+    }
+
+    /// The other orientation of the same label if `flip`.
+    #[must_use]
+    #[inline]
+    pub fn turn(self, flip: bool) -> Self {
+        Self::from_word(self.word ^ u32::from(flip))
+    }
+}
 
 /// Packs a constraint in a word.
 #[must_use]
 #[inline]
-pub fn word((label, flip): OrientationConstraint) -> u32 {
-    label << 1 | u32::from(flip)
+pub fn word<T: Number>((label, flip): OrientationConstraint<T>) -> Turned<T> {
+    Turned::from_word((label.index() as u32) << 1 | u32::from(flip))
 }
 
 /// Unpacks a word.
 #[must_use]
 #[inline]
-pub fn constraint(word: u32) -> OrientationConstraint {
-    (word >> 1, word & 1 == 1)
+pub fn constraint<T: Number>(turned: Turned<T>) -> OrientationConstraint<T> {
+    (T::at((turned.word >> 1) as usize), turned.word & 1 == 1)
 }
 
 /// A weight, negative if `flip`.
@@ -25,25 +70,28 @@ pub fn signed(flip: bool, weight: i64) -> i64 {
 }
 
 /// Sets of labels with relative orientations.
-#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
-pub struct ParitySets {
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+#[serde(bound = "")]
+pub struct ParitySets<T> {
     /// Parent and, in the lowest bit, orientation relative to the parent.
-    parent: Vec<u32>,
+    parent: Vec<Turned<T>>,
 }
 
-impl ParitySets {
+impl<T: Number> ParitySets<T> {
     /// `count` sets of one label each.
     #[must_use]
     pub fn new(count: usize) -> Self {
         Self {
-            parent: (0..count as u32).map(|label| label << 1).collect(),
+            parent: (0..count)
+                .map(|label| word((T::at(label), false)))
+                .collect(),
         }
     }
 
     /// Adds a set of one new label, and returns the label.
-    pub fn push(&mut self) -> u32 {
-        let label = self.parent.len() as u32;
-        self.parent.push(label << 1);
+    pub fn push(&mut self) -> T {
+        let label = T::at(self.parent.len());
+        self.parent.push(word((label, false)));
         label
     }
 
@@ -60,22 +108,22 @@ impl ParitySets {
     }
 
     /// The root of a label's set, and the label's orientation relative to the root.
-    pub fn find(&mut self, label: u32) -> (u32, bool) {
+    pub fn find(&mut self, label: T) -> (T, bool) {
         let mut node = label;
-        let mut flip = 0;
+        let mut flip = false;
         loop {
-            let word = self.parent[node as usize];
-            let up = word >> 1;
+            let (up, turned) = constraint(self.parent[node.index()]);
             if up == node {
-                return (node, flip & 1 == 1);
+                return (node, flip);
             }
-            let above = self.parent[up as usize];
-            flip ^= word & 1;
+            let above = self.parent[up.index()];
+            let (top, more) = constraint(above);
+            flip ^= turned;
             // Path halving: point at the grandparent.
-            if above >> 1 != up {
-                self.parent[node as usize] = above ^ (word & 1);
-                flip ^= above & 1;
-                node = above >> 1;
+            if top != up {
+                self.parent[node.index()] = above.turn(turned);
+                flip ^= more;
+                node = top;
             } else {
                 node = up;
             }
@@ -85,47 +133,47 @@ impl ParitySets {
     /// Joins the sets of two labels, with `b` turned by `flip` against `a`; the root of `a` stays a root. If
     /// they are already in one set with the other relative orientation, nothing changes and the result is
     /// false.
-    pub fn join(&mut self, a: u32, b: u32, flip: bool) -> bool {
+    pub fn join(&mut self, a: T, b: T, flip: bool) -> bool {
         let (root_a, flip_a) = self.find(a);
         let (root_b, flip_b) = self.find(b);
         let turned = flip ^ flip_a ^ flip_b;
         if root_a == root_b {
             return !turned;
         }
-        self.parent[root_b as usize] = word((root_a, turned));
+        self.parent[root_b.index()] = word((root_a, turned));
         true
     }
 
     /// As [`ParitySets::join`], but the smaller of the two roots stays a root.
-    pub fn join_to_smaller(&mut self, a: u32, b: u32, flip: bool) -> bool {
+    pub fn join_to_smaller(&mut self, a: T, b: T, flip: bool) -> bool {
         let ((a, flip_a), (b, flip_b)) = (self.find(a), self.find(b));
         self.join(a.min(b), a.max(b), flip ^ flip_a ^ flip_b)
     }
 
     /// Makes the parent of every label its root.
     pub fn flatten(&mut self) {
-        for label in 0..self.parent.len() as u32 {
-            let (root, flip) = self.find(label);
-            self.parent[label as usize] = word((root, flip));
+        for label in 0..self.parent.len() {
+            let (root, flip) = self.find(T::at(label));
+            self.parent[label] = word((root, flip));
         }
     }
 
     /// As [`ParitySets::find`], without shortening paths.
     #[must_use]
-    pub fn look(&self, label: u32) -> (u32, bool) {
-        let (mut node, mut flip) = (label, 0);
+    pub fn look(&self, label: T) -> (T, bool) {
+        let (mut node, mut flip) = (label, false);
         loop {
-            let word = self.parent[node as usize];
-            if word >> 1 == node {
-                return (node, flip & 1 == 1);
+            let (up, turned) = constraint(self.parent[node.index()]);
+            if up == node {
+                return (node, flip);
             }
-            flip ^= word & 1;
-            node = word >> 1;
+            flip ^= turned;
+            node = up;
         }
     }
 
     /// The relative orientation of two labels; `None` if they are in different sets.
-    pub fn relation(&mut self, a: u32, b: u32) -> Option<bool> {
+    pub fn relation(&mut self, a: T, b: T) -> Option<bool> {
         let (root_a, flip_a) = self.find(a);
         let (root_b, flip_b) = self.find(b);
         (root_a == root_b).then_some(flip_a ^ flip_b)
@@ -133,7 +181,7 @@ impl ParitySets {
 
     /// True if `constraints` do not contradict each other, given the joined sets.
     #[must_use]
-    pub fn allow(&mut self, constraints: &[OrientationConstraint]) -> bool {
+    pub fn allow(&mut self, constraints: &[OrientationConstraint<T>]) -> bool {
         constraints.iter().enumerate().all(|(x, &(a, flip_a))| {
             constraints[..x].iter().all(|&(b, flip_b)| {
                 self.relation(a, b)
@@ -144,7 +192,7 @@ impl ParitySets {
 
     /// Joins the labels of `constraints`. If they contradict each other, nothing changes and the result is
     /// false.
-    pub fn merge(&mut self, constraints: &[OrientationConstraint]) -> bool {
+    pub fn merge(&mut self, constraints: &[OrientationConstraint<T>]) -> bool {
         let fits = self.allow(constraints);
         if let (true, Some((&(first, flip), others))) = (fits, constraints.split_first()) {
             for &(other, turned) in others {

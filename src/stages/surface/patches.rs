@@ -2,9 +2,9 @@
 
 use super::evidence::{Evidence, LongNormal};
 use super::parity::ParitySets;
-use super::sides::{NONE, across, parts};
+use super::sides::{across, parts};
 use super::star::{EDGES, Triangle};
-use crate::ids::Ids;
+use crate::ids::{Ids, PatchNumber, Side, TriangleIndex};
 use outcrop_disk::workspace::memory::bytes_of;
 use std::ops::Range;
 
@@ -12,9 +12,9 @@ use std::ops::Range;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SharedEdge {
     /// The earlier triangle.
-    pub a: u32,
+    pub a: TriangleIndex,
     /// The later one.
-    pub b: u32,
+    pub b: TriangleIndex,
     /// True if one of the two must be turned to orient them alike.
     pub flip: bool,
     /// Weight of the edge, see [`weight`].
@@ -25,11 +25,11 @@ pub struct SharedEdge {
 #[derive(Debug)]
 pub struct Patches {
     /// The joined triangles, with their relative orientations.
-    pub sets: ParitySets,
+    pub sets: ParitySets<TriangleIndex>,
     /// The patch of each triangle.
-    pub of: Vec<u32>,
+    pub of: Vec<PatchNumber>,
     /// For each patch, its smallest triangle, which defines its orientation, and its number of triangles.
-    pub roots: Vec<(u32, u32)>,
+    pub roots: Vec<(TriangleIndex, u32)>,
     /// Edges between patches, and edges inside a patch whose triangles are not oriented alike, by ascending
     /// triangles.
     pub shared: Vec<SharedEdge>,
@@ -60,10 +60,10 @@ impl Patches {
         let mut shared = runs.shared;
         drop(across);
         let (of, roots) = number(&mut sets);
-        let apart = |j: &SharedEdge| of[j.a as usize] != of[j.b as usize];
+        let apart = |j: &SharedEdge| of[j.a.index()] != of[j.b.index()];
         shared.retain(|j| apart(j) || sets.relation(j.a, j.b) != Some(j.flip));
         for j in &mut shared {
-            let [a, b] = [j.a, j.b].map(|n| evidence.long_normal(triangles[n as usize]));
+            let [a, b] = [j.a, j.b].map(|n| evidence.long_normal(triangles[n.index()]));
             j.weight = a.weight(b, j.flip) as u8;
         }
         Self {
@@ -85,25 +85,25 @@ impl Patches {
 /// Joins triangles run by run.
 struct Runs<'a> {
     triangles: &'a [Triangle],
-    across: &'a [[u32; 3]],
+    across: &'a [[Side; 3]],
     evidence: &'a Evidence,
     /// Normals of the triangles of the run.
     normals: Vec<LongNormal>,
     /// Buffer for the edges between triangles of the run, as in a [`SharedEdge`].
-    edges: Vec<(u32, u32, bool)>,
+    edges: Vec<(TriangleIndex, TriangleIndex, bool)>,
     /// The edges that were not joined, without their weights.
     shared: Vec<SharedEdge>,
 }
 
 impl Runs<'_> {
     /// Joins the triangles of a run across their flat edges.
-    fn join(&mut self, run: Range<usize>, sets: &mut ParitySets) {
+    fn join(&mut self, run: Range<usize>, sets: &mut ParitySets<TriangleIndex>) {
         let Runs { normals, edges, .. } = self;
         normals.clear();
         let triangles = &self.triangles[run.clone()];
         normals.extend(triangles.iter().map(|t| self.evidence.long_normal(*t)));
         if edges.len() < 3 * run.len() {
-            edges.resize(3 * run.len(), (0, 0, false));
+            edges.resize(3 * run.len(), Default::default());
         }
         let mut count = 0;
         for (n, sides) in (run.start..).zip(&self.across[run.clone()]) {
@@ -112,12 +112,13 @@ impl Runs<'_> {
                 let side = sides[opposite];
                 let (m, corner) = parts(side);
                 // Edges between the first and the last vertex of a triangle run down, others run up.
-                edges[count] = (n as u32, m as u32, (opposite == 1) == (corner == 1));
-                count += usize::from(side != NONE && m > n);
+                let ends = [n, m].map(TriangleIndex::at);
+                edges[count] = (ends[0], ends[1], (opposite == 1) == (corner == 1));
+                count += usize::from(side != Side::NONE && m > n);
             }
         }
         for &(a, b, flip) in &edges[..count] {
-            let (n, m) = (a as usize, b as usize);
+            let (n, m) = (a.index(), b.index());
             let flat = || normals[n - run.start].is_flat(normals[m - run.start], flip);
             if !(m < run.end && flat() && sets.join_to_smaller(a, b, flip)) {
                 let weight = 0;
@@ -128,18 +129,18 @@ impl Runs<'_> {
 }
 
 /// Numbers the sets in the order of their first triangles.
-fn number(sets: &mut ParitySets) -> (Vec<u32>, Vec<(u32, u32)>) {
-    let mut number = vec![NONE; sets.len()];
+fn number(sets: &mut ParitySets<TriangleIndex>) -> (Vec<PatchNumber>, Vec<(TriangleIndex, u32)>) {
+    let mut number = vec![PatchNumber::NONE; sets.len()];
     let mut of = Vec::with_capacity(sets.len());
-    let mut roots: Vec<(u32, u32)> = Vec::new();
-    for triangle in 0..sets.len() as u32 {
+    let mut roots: Vec<(TriangleIndex, u32)> = Vec::new();
+    for triangle in (0..sets.len()).map(TriangleIndex::at) {
         let (root, _) = sets.find(triangle);
-        let number = &mut number[root as usize];
-        if *number == NONE {
-            *number = roots.len() as u32;
+        let number = &mut number[root.index()];
+        if *number == PatchNumber::NONE {
+            *number = PatchNumber::at(roots.len());
             roots.push((root, 0));
         }
-        roots[*number as usize].1 += 1;
+        roots[number.index()].1 += 1;
         of.push(*number);
     }
     (of, roots)

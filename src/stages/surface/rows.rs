@@ -1,8 +1,8 @@
 //! Rows of triangles and their orientations.
 
-use super::parity::{OrientationConstraint, constraint};
+use super::parity::{OrientationConstraint, Turned, constraint};
 use super::star::Triangle;
-use crate::ids::Block;
+use crate::ids::{Block, GlobalLabel, Label, TriangleIndex};
 use outcrop_disk::spill::row;
 
 row! {
@@ -32,7 +32,7 @@ row! {
         triangle: Triangle,
         /// `label << 1 | flip`: its label, and 1 if it is turned against its ascending ids relative to the
         /// label.
-        label_flip: u32,
+        label_flip: Turned<Label>,
     }
     packed Above Rising Rising Above
 }
@@ -45,7 +45,7 @@ row! {
         /// Ids, ascending.
         triangle: Triangle,
         /// See [`LabelledTriangle`].
-        label_flip: u32,
+        label_flip: Turned<GlobalLabel>,
     }
     packed Above Above Rising Rising Above
 }
@@ -60,7 +60,7 @@ row! {
         /// Block of the interior triangle.
         block: Block,
         /// `label << 1 | flip`: its label, and 1 if the crossing triangle is turned against the label.
-        label_flip: u32,
+        label_flip: Turned<Label>,
         /// Weight of the common edge.
         weight: u32,
     }
@@ -71,9 +71,9 @@ row! {
     /// The sum of weights between two labels of a block.
     pub struct PairSum {
         /// The first label.
-        a: u32,
+        a: Label,
         /// The second label.
-        b: u32,
+        b: Label,
         /// Weights for the two being oriented alike, less those against; see [`words`].
         sum: [u32; 2],
     }
@@ -84,7 +84,7 @@ row! {
     /// Evidence that a label faces up.
     pub struct Upward {
         /// The label.
-        label: u32,
+        label: Label,
         /// Evidence for facing up, less that for facing down; see [`words`].
         evidence: [u32; 2],
     }
@@ -95,9 +95,9 @@ row! {
     /// An edge between triangles of different labels, given by their indices among the interior triangles.
     pub struct Seam {
         /// Index of the first triangle.
-        a: u32,
+        a: TriangleIndex,
         /// `index << 1 | flip` of the second triangle; 1 if it must be turned against the first.
-        b_flip: u32,
+        b_flip: Turned<TriangleIndex>,
     }
     packed Above Above
 }
@@ -124,11 +124,11 @@ pub fn sum([low, high]: [u32; 2]) -> i64 {
 /// The constraints of interior triangles on the crossing triangle `t` of `block`, with their weights, from
 /// its `relations`; with global labels.
 pub(super) fn interior_constraints(
-    globals: &[(u32, u32)],
+    globals: &[(GlobalLabel, u32)],
     relations: &[Relation],
     block: usize,
     t: Triangle,
-) -> impl Iterator<Item = (OrientationConstraint, i64)> {
+) -> impl Iterator<Item = (OrientationConstraint<GlobalLabel>, i64)> {
     let key = (Block::at(block), t);
     let start = relations.partition_point(|r| (r.to, r.triangle) < key);
     relations[start..]
@@ -137,6 +137,6 @@ pub(super) fn interior_constraints(
         .map(|r| {
             let (label, flip) = constraint(r.label_flip);
             let first = globals[r.block.index()].0;
-            ((first + label, flip), i64::from(r.weight))
+            ((first.of(label), flip), i64::from(r.weight))
         })
 }

@@ -9,6 +9,7 @@ use super::parity::{OrientationConstraint, signed, word};
 use super::rows::{Relation, interior_constraints, sum};
 use super::star::Triangle;
 use crate::blocks::Blocks;
+use crate::ids::GlobalLabel;
 use outcrop_disk::error::Result;
 use outcrop_disk::spill::Inbox;
 use outcrop_disk::workspace::Unit;
@@ -29,10 +30,10 @@ pub(super) fn settle(
     for block in 0..blocks.count() {
         let first = surface.globals[block].0;
         for pair in weighed.pairs.get(unit, block)? {
-            graph.add(first + pair.a, first + pair.b, sum(pair.sum));
+            graph.add(first.of(pair.a), first.of(pair.b), sum(pair.sum));
         }
         for up in weighed.ups.get(unit, block)? {
-            graph.add_up(first + up.label, sum(up.evidence));
+            graph.add_up(first.of(up.label), sum(up.evidence));
         }
         reserved.at_least(graph.bytes())?;
     }
@@ -44,7 +45,7 @@ pub(super) fn settle(
         edges.make_room(triangles.len())?;
         for (t, normal) in triangles {
             // Label, flip and weight of each neighbour; interior neighbours come first.
-            let mut neighbors: Vec<(OrientationConstraint, i64)> =
+            let mut neighbors: Vec<(OrientationConstraint<GlobalLabel>, i64)> =
                 interior_constraints(&surface.globals, &relations, group, t).collect();
             let before = edges.adjacent(t);
             neighbors.extend(before.map(|(constraint, opposed, other)| {
@@ -69,10 +70,10 @@ pub(super) fn settle(
     let clusters = graph.contract(Limit::None);
     // One label of the surface that represents each cluster.
     let mut representative = vec![None; graph.len()];
-    for label in 0..surface.sets.len() as u32 {
+    for label in (0..surface.sets.len()).map(GlobalLabel::at) {
         let (root, flip) = clusters.look(label);
-        match representative[root as usize] {
-            None => representative[root as usize] = Some((label, flip)),
+        match representative[root.index()] {
+            None => representative[root.index()] = Some((label, flip)),
             Some((first, turned)) => _ = surface.sets.join(first, label, flip ^ turned),
         }
     }

@@ -1,23 +1,20 @@
 //! Pairs of triangles that share an edge inside a block.
 
 use super::star::{ByVertex, Triangle};
-use crate::ids::{Id, Ids};
-
-/// Stands for an edge without a second triangle inside the block.
-pub const NONE: u32 = u32::MAX;
+use crate::ids::{Id, Ids, Side, TriangleIndex};
 
 /// An edge of a triangle packed in a word: the triangle, and the corner opposite the edge.
 #[must_use]
 #[inline]
-pub fn side(triangle: u32, corner: u32) -> u32 {
-    triangle << 2 | corner
+pub fn side(triangle: TriangleIndex, corner: u32) -> Side {
+    Side::new(triangle.get() << 2 | corner)
 }
 
 /// The triangle and the corner of a [`side`].
 #[must_use]
 #[inline]
-pub fn parts(side: u32) -> (usize, usize) {
-    ((side >> 2) as usize, (side & 3) as usize)
+pub fn parts(side: Side) -> (usize, usize) {
+    ((side.get() >> 2) as usize, (side.get() & 3) as usize)
 }
 
 /// Visits the edges with both ends in `ids`, ascending by their lower ends. `pair` receives the two [`side`]s
@@ -29,8 +26,8 @@ pub fn parts(side: u32) -> (usize, usize) {
 pub fn pair_edges(
     ids: Ids,
     triangles: &[Triangle],
-    mut pair: impl FnMut(u32, u32),
-    mut lone: impl FnMut(u32, [u32; 2]),
+    mut pair: impl FnMut(Side, Side),
+    mut lone: impl FnMut(Side, [u32; 2]),
 ) {
     let size = ids.len() as u32;
     let local = |v: Id| ids.find(v) as u32;
@@ -38,29 +35,33 @@ pub fn pair_edges(
     // By their middle vertices, the triangles whose upper edge is inside the block.
     let middles = triangles.iter().filter(|t| inside(t)).map(|t| t[1]);
     let mut upper = ByVertex::with_room(ids, middles);
-    for (number, t) in (0..).zip(triangles).filter(|(_, t)| inside(t)) {
+    for (number, t) in (0..)
+        .map(TriangleIndex::new)
+        .zip(triangles)
+        .filter(|(_, t)| inside(t))
+    {
         upper.push(t[1], number);
     }
     // For each vertex, the last lower end from which an edge to it was found, plus one, and the side of this
     // edge.
-    let mut seen = vec![(0u32, NONE); size as usize];
+    let mut seen = vec![(0u32, Side::NONE); size as usize];
     let mut next = triangles.partition_point(|t| t[0] < ids.start) as u32;
     for v in 0..size {
         let first = next;
         let own = triangles[next as usize..].iter();
         next += own.take_while(|t| local(t[0]) == v).count() as u32;
-        let own = first..next;
+        let own = (first..next).map(TriangleIndex::new);
         let upper = upper.at(ids.id(v as usize));
         // The place of a corner in the block: the upper end of an edge from `v`.
-        let end = |number: u32, corner: usize| local(triangles[number as usize][corner]);
+        let end = |number: TriangleIndex, corner: usize| local(triangles[number.index()][corner]);
         let mut single = 0;
-        let mut mark = |number: u32, corner: u32, y: u32| {
+        let mut mark = |number: TriangleIndex, corner: u32, y: u32| {
             if y < size {
                 let seen = &mut seen[y as usize];
                 let this = side(number, corner);
                 if seen.0 == v + 1 {
                     pair(seen.1, this);
-                    *seen = (v + 1, NONE);
+                    *seen = (v + 1, Side::NONE);
                     single -= 1;
                 } else {
                     *seen = (v + 1, this);
@@ -76,7 +77,7 @@ pub fn pair_edges(
             mark(n, 1, end(n, 2));
         }
         if single > 0 {
-            let mut report = |number: u32, corner: u32, y: u32| {
+            let mut report = |number: TriangleIndex, corner: u32, y: u32| {
                 let this = side(number, corner);
                 if y < size && seen[y as usize].1 == this {
                     lone(this, [v, y]);
@@ -94,11 +95,11 @@ pub fn pair_edges(
 }
 
 /// For each of the ascending `triangles`, all with their vertices in `ids`: for the edge opposite each
-/// corner, the [`side`] of the adjacent triangle, or [`NONE`]. For traversals from triangle to triangle. No
+/// corner, the [`side`] of the adjacent triangle, or [`Side::NONE`]. For traversals from triangle to triangle. No
 /// edge may have more than two triangles.
 #[must_use]
-pub fn across(ids: Ids, triangles: &[Triangle]) -> Vec<[u32; 3]> {
-    let mut across = vec![[NONE; 3]; triangles.len()];
+pub fn across(ids: Ids, triangles: &[Triangle]) -> Vec<[Side; 3]> {
+    let mut across = vec![[Side::NONE; 3]; triangles.len()];
     let pair = |a, b| {
         for (this, other) in [(a, b), (b, a)] {
             let (number, corner) = parts(this);
@@ -138,7 +139,7 @@ mod tests {
                 let edges = [[t[1], t[2]], [t[0], t[2]], [t[0], t[1]]];
                 for (edge, side) in edges.iter().zip(across) {
                     let other = behind[edge].iter().find(|u| *u != t);
-                    let found = (side != NONE).then(|| {
+                    let found = (side != Side::NONE).then(|| {
                         let (number, corner) = parts(side);
                         let u = &triangles[number];
                         assert!(!edge.contains(&u[corner]));

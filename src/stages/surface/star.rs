@@ -1,7 +1,7 @@
 //! The triangles around the vertices and edges of a block.
 
 pub use crate::ids::Triangle;
-use crate::ids::{Id, Ids};
+use crate::ids::{Id, Ids, TriangleIndex};
 use bytemuck::{Zeroable, zeroed_vec};
 use outcrop_disk::workspace::memory::bytes_of;
 
@@ -104,14 +104,14 @@ impl<T: Copy + Zeroable> ByVertex<T> {
 }
 
 /// For each vertex of a block, its star: the numbers of the triangles that contain it.
-pub type Star = ByVertex<u32>;
+pub type Star = ByVertex<TriangleIndex>;
 
 impl Star {
     /// The stars of the vertices `ids`, with all `triangles` numbered in their order.
     #[must_use]
     pub fn of(ids: Ids, triangles: &[Triangle]) -> Self {
         let mut star = Self::with_room(ids, triangles.iter().flatten().copied());
-        for (number, t) in (0..).zip(triangles) {
+        for (number, t) in (0..).map(TriangleIndex::new).zip(triangles) {
             t.iter().for_each(|v| star.push(*v, number));
         }
         star
@@ -120,7 +120,7 @@ impl Star {
 
 /// For each vertex of a block, the edges to higher vertices: the higher vertex and the number of a triangle
 /// there. Used to find the neighbours of a triangle.
-pub type EdgesUp = ByVertex<(Id, u32)>;
+pub type EdgesUp = ByVertex<(Id, TriangleIndex)>;
 
 impl EdgesUp {
     /// No edges, with room for those of `triangles`.
@@ -131,7 +131,7 @@ impl EdgesUp {
     }
 
     /// Adds triangle `t` as `number`.
-    pub fn add(&mut self, t: Triangle, number: u32) {
+    pub fn add(&mut self, t: Triangle, number: TriangleIndex) {
         for (a, b, ..) in EDGES {
             self.push(t[a], (t[b], number));
         }
@@ -139,7 +139,7 @@ impl EdgesUp {
 
     /// Numbers of the triangles at the edge `low < high`, in order of insertion; none if `low` is
     /// not in the block.
-    pub fn at_edge(&self, low: Id, high: Id) -> impl Iterator<Item = u32> + '_ {
+    pub fn at_edge(&self, low: Id, high: Id) -> impl Iterator<Item = TriangleIndex> + '_ {
         let edges = if self.ids.contains(&low) {
             self.at(low)
         } else {

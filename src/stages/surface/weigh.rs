@@ -8,7 +8,7 @@ use super::parity::signed;
 use super::patches::Patches;
 use super::star::{EdgesUp, Triangle};
 use crate::blocks::Blocks;
-use crate::ids::{Id, Ids};
+use crate::ids::{Id, Ids, PatchNumber, TriangleIndex};
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_geom::method::METHOD;
 
@@ -37,12 +37,13 @@ pub(super) fn weigh_block(
     let most = weigher.most.max(patches + weigher.graph.bytes());
     weigher.contract(division.cluster, &mut connections);
     let dead = weigher.cut();
-    let kept: Vec<u32> = (0..inner.len() as u32)
-        .filter(|n| !dead[*n as usize])
+    let kept: Vec<TriangleIndex> = (0..inner.len())
+        .filter(|n| !dead[*n])
+        .map(TriangleIndex::at)
         .collect();
-    connections.relations.retain(|r| !dead[r.1 as usize]);
+    connections.relations.retain(|r| !dead[r.1.index()]);
     let seams = &mut weigher.patches.shared;
-    seams.retain(|j| !dead[j.a as usize] && !dead[j.b as usize]);
+    seams.retain(|j| !dead[j.a.index()] && !dead[j.b.index()]);
     connections.seams = std::mem::take(seams);
     let connected = bytes_of(&connections.relations)
         + bytes_of(&connections.pairs)
@@ -58,7 +59,7 @@ pub(super) fn weigh_block(
 /// The patches of a block, and the graph that decides their relative orientations.
 struct Weigher<'a> {
     patches: Patches,
-    graph: Graph,
+    graph: Graph<PatchNumber>,
     inner: &'a [Triangle],
     evidence: &'a Evidence,
     ids: Ids,
@@ -68,13 +69,13 @@ struct Weigher<'a> {
 
 impl Weigher<'_> {
     /// The patch of a triangle, and true if the triangle is turned against it.
-    fn patch(&self, triangle: u32) -> (u32, bool) {
+    fn patch(&self, triangle: TriangleIndex) -> (PatchNumber, bool) {
         let (_, turned) = self.patches.sets.look(triangle);
-        (self.patches.of[triangle as usize], turned)
+        (self.patches.of[triangle.index()], turned)
     }
 
     /// Adds to the sum of the patches of two triangles; one of the two must be turned if `flip`.
-    fn connect(&mut self, a: u32, b: u32, flip: bool, weight: i64) {
+    fn connect(&mut self, a: TriangleIndex, b: TriangleIndex, flip: bool, weight: i64) {
         let ((of_a, up_a), (of_b, up_b)) = (self.patch(a), self.patch(b));
         let weight = signed(flip ^ up_a ^ up_b, weight);
         self.graph.add(of_a, of_b, weight);
@@ -83,7 +84,7 @@ impl Weigher<'_> {
     /// Makes the patches nodes, with the evidence that they face up, or to the scanners.
     fn add_patches(&mut self) {
         self.graph = Graph::new(self.patches.roots.len());
-        for (node, (_, triangles)) in (0..).zip(&self.patches.roots) {
+        for (node, (_, triangles)) in (0..).map(PatchNumber::new).zip(&self.patches.roots) {
             self.graph.add_triangles(node, u64::from(*triangles));
         }
         let witnesses = &self.evidence.witnesses;
@@ -91,7 +92,7 @@ impl Weigher<'_> {
         for w in witnesses {
             known[self.ids.place(w.vertex)] = true;
         }
-        for (number, t) in (0..).zip(self.inner) {
+        for (number, t) in (0..).map(TriangleIndex::new).zip(self.inner) {
             let known = t.map(|v| known[self.ids.place(v)]);
             if known.contains(&true) {
                 let normal = self.evidence.normal(*t);
@@ -125,7 +126,7 @@ impl Weigher<'_> {
                 let weight = self.weight(c, other, flip);
                 connections.relations.push((c, other, flip, weight));
                 // The most that the other two edges of the crossing triangle can weigh.
-                let of = self.patches.of[other as usize];
+                let of = self.patches.of[other.index()];
                 let most = 2 * METHOD.orientation.edge * METHOD.orientation.flattest;
                 self.graph.add_outside(of, most);
             }
@@ -145,9 +146,12 @@ impl Weigher<'_> {
         let place = |v: Id| self.ids.place(v);
         // True if an edge of the triangle joins two of their vertices.
         let beside = |t: &Triangle| t.iter().filter(|v| seen[place(**v)]).count() > 1;
-        let some = (0..).zip(inner).filter(|(_, t)| beside(t));
-        let numbers: Vec<u32> = some.map(|(number, _)| number).collect();
-        let triangle = |n: &u32| &inner[*n as usize];
+        let some = (0..)
+            .map(TriangleIndex::new)
+            .zip(inner)
+            .filter(|(_, t)| beside(t));
+        let numbers: Vec<TriangleIndex> = some.map(|(number, _)| number).collect();
+        let triangle = |n: &TriangleIndex| &inner[n.index()];
         let mut edges = EdgesUp::with_room_for(self.ids, numbers.iter().map(triangle));
         for number in &numbers {
             edges.add(*triangle(number), *number);
@@ -158,14 +162,14 @@ impl Weigher<'_> {
     }
 
     /// The weight of the edge between two triangles.
-    fn weight(&self, t: Triangle, other: u32, flip: bool) -> i64 {
-        let other = self.evidence.normal(self.inner[other as usize]);
+    fn weight(&self, t: Triangle, other: TriangleIndex, flip: bool) -> i64 {
+        let other = self.evidence.normal(self.inner[other.index()]);
         weight(cosine(self.evidence.normal(t), other, flip))
     }
 
     /// A candidate connects each two of the first three triangles at its edges.
     fn vote(&mut self, c: Triangle, edges: &EdgesUp) {
-        let mut constraints = [(0, false); 3];
+        let mut constraints = [(TriangleIndex::default(), false); 3];
         let mut count = 0;
         adjacent(c, edges, self.inner, &self.ids, |other, flip| {
             if count < 3 {
@@ -176,7 +180,7 @@ impl Weigher<'_> {
         for x in 1..count {
             for y in 0..x {
                 let ((a, flip_a), (b, flip_b)) = (constraints[x], constraints[y]);
-                if self.patches.of[a as usize] != self.patches.of[b as usize] {
+                if self.patches.of[a.index()] != self.patches.of[b.index()] {
                     let weight = self.weight(c, a, flip_a).min(self.weight(c, b, flip_b));
                     self.connect(a, b, flip_a ^ flip_b, weight);
                 }
@@ -187,8 +191,8 @@ impl Weigher<'_> {
     /// Contracts patches to clusters, as far as this cannot be wrong for the rest of the cloud.
     fn contract(&mut self, cluster: u64, connections: &mut Connections) {
         let clusters = self.graph.contract(Limit::Triangles(cluster));
-        let root = |patch: u32| self.patches.roots[patch as usize].0;
-        for patch in 0..self.patches.roots.len() as u32 {
+        let root = |patch: PatchNumber| self.patches.roots[patch.index()].0;
+        for patch in (0..self.patches.roots.len()).map(PatchNumber::at) {
             let (of, flip) = clusters.look(patch);
             let (of, patch) = (root(of), root(patch));
             self.patches.sets.join(of, patch, flip);
@@ -211,7 +215,7 @@ impl Weigher<'_> {
             None => true,
             Some(flip) if flip == edge.flip => false,
             Some(_) => {
-                dead[edge.b as usize] |= !dead[edge.a as usize];
+                dead[edge.b.index()] |= !dead[edge.a.index()];
                 false
             }
         });

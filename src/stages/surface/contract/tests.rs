@@ -103,7 +103,7 @@ impl Plain {
     }
 }
 
-fn graph(nodes: &Nodes, pairs: &[(u32, u32, i64)], sky: bool) -> Graph {
+fn graph(nodes: &Nodes, pairs: &[(u32, u32, i64)], sky: bool) -> Graph<u32> {
     let mut graph = Graph::new(nodes.len());
     for (v, &(triangles, outside, up)) in (0..).zip(nodes) {
         graph.add_triangles(v, triangles);

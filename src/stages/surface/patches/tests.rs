@@ -43,7 +43,7 @@ pub(in super::super) fn inner_edges(ids: Ids, triangles: &[Triangle]) -> Vec<(us
     for (n, sides) in across(ids, triangles).into_iter().enumerate() {
         for (a, b, opposite, _) in EDGES {
             let (m, _) = parts(sides[opposite]);
-            if sides[opposite] != NONE && n <= m {
+            if sides[opposite] != Side::NONE && n <= m {
                 let t = triangles[n];
                 edges.push((n, m, opposed(t, triangles[m], t[a], t[b])));
             }
@@ -95,21 +95,22 @@ proptest! {
             let near = t[0].get() / patch == other[0].get() / patch;
             prop_assert!(one || !near || cosine <= METHOD.orientation.flat, "{:?} {:?}", t, other);
             prop_assert!(!one || near);
-            if !one || patches.sets.relation(n as u32, m as u32) != Some(flip) {
-                let edge = SharedEdge { a: n as u32, b: m as u32, flip, weight };
+            if !one || patches.sets.relation(TriangleIndex::at(n), TriangleIndex::at(m)) != Some(flip) {
+                let [a, b] = [n, m].map(TriangleIndex::at);
+                let edge = SharedEdge { a, b, flip, weight };
                 prop_assert_eq!(shared.remove(0), edge);
             }
         }
         prop_assert_eq!(shared, []);
-        let mut first: Vec<u32> = Vec::new();
-        for (n, of) in (0..).zip(&patches.of) {
-            prop_assert!(*of as usize <= first.len());
-            if *of as usize == first.len() {
+        let mut first: Vec<TriangleIndex> = Vec::new();
+        for (n, of) in (0..).map(TriangleIndex::at).zip(&patches.of) {
+            prop_assert!(of.index() <= first.len());
+            if of.index() == first.len() {
                 first.push(n);
             }
-            prop_assert_eq!(patches.sets.find(n).0, first[*of as usize]);
+            prop_assert_eq!(patches.sets.find(n).0, first[of.index()]);
         }
-        let roots: Vec<u32> = patches.roots.iter().map(|(root, _)| *root).collect();
+        let roots: Vec<TriangleIndex> = patches.roots.iter().map(|(root, _)| *root).collect();
         prop_assert_eq!(roots, first);
         let count: u32 = patches.roots.iter().map(|(_, count)| count).sum();
         prop_assert_eq!(count as usize, triangles.len());
@@ -137,7 +138,7 @@ fn a_patch_ends_at_a_fold_and_where_its_run_ends() {
         let found: Vec<Id> = patches
             .roots
             .iter()
-            .map(|(root, _)| triangles[*root as usize][0])
+            .map(|(root, _)| triangles[root.index()][0])
             .collect();
         assert_eq!(found, firsts.into_iter().map(Id::new).collect::<Vec<_>>());
     }

@@ -13,7 +13,7 @@ fn oriented(
     triangles: &[Triangle],
     places: &[Point],
     division: Division,
-) -> (ParitySets, Vec<bool>) {
+) -> (ParitySets<TriangleIndex>, Vec<bool>) {
     let ids = Ids::of(0..places.len() as u32);
     let evidence = &evidence(places, division);
     let mut weigher = Weigher {
@@ -46,7 +46,7 @@ proptest! {
         let (mut sets, dead) = oriented(&triangles, &places, division);
         let mut contradicted = vec![false; triangles.len()];
         for (n, m, flip) in inner_edges(Ids::of(0..27), &triangles) {
-            let fits = sets.relation(n as u32, m as u32) == Some(flip);
+            let fits = sets.relation(TriangleIndex::at(n), TriangleIndex::at(m)) == Some(flip);
             prop_assert!(fits || dead[n] || dead[m], "{} and {} are left and contradict", n, m);
             contradicted[m] |= !fits;
         }
