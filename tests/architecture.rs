@@ -73,7 +73,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ),
     ("stages/surface", "stages/blocks stages/ids stages/located"),
     ("stages/thin", ""),
-    ("stages/tiles", "stages/order"),
+    ("stages/tiles", "stages/ids stages/order"),
     ("stages/triples", "stages/blocks stages/cells stages/ids"),
 ];
 

@@ -103,6 +103,11 @@ number! {
 }
 
 number! {
+    /// The number of a page of a store.
+    PageNumber: u32
+}
+
+number! {
     /// The place of a triangle in a list of triangles of a block.
     TriangleIndex: u32
 }
@@ -167,6 +172,9 @@ impl Row for Id {
 pub type Triangle = [Id; 3];
 
 impl Id {
+    /// Most points that have ids.
+    pub const MOST: u64 = Width::MAX as u64 - 1;
+
     /// An id that no point has; larger than all others.
     pub const NONE: Self = Self(Width::MAX);
 
@@ -188,6 +196,13 @@ impl Id {
 #[must_use]
 pub fn triangle(ids: [Width; 3]) -> Triangle {
     ids.map(Id)
+}
+
+/// True if two triangles are the same. Arrays of types are compared more slowly than arrays of numbers.
+#[must_use]
+#[inline(always)]
+pub fn same(one: Triangle, other: Triangle) -> bool {
+    one.map(Id::get) == other.map(Id::get)
 }
 
 /// Consecutive ids.

@@ -4,7 +4,7 @@ use super::number::Numbering;
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::Workspace;
 use outcrop_geom::Point;
-use outcrop_stages::ids::Id;
+use outcrop_stages::ids::{Id, PageNumber};
 use outcrop_stages::order::PointStore;
 
 /// The lowest and the highest coordinates of the points that are vertices, along each axis. Pages are read in
@@ -20,18 +20,19 @@ pub fn bounds(
     workspace.once("bounds", |_| {
         let list = store.pages() * 4 + store.page_size() * 32;
         let _held = workspace.reserve("export: bounds", list as u64)?;
-        let is_used = |page: &u32| {
-            let ids = store.page_ids(*page as usize);
+        let is_used = |page: &PageNumber| {
+            let ids = store.page_ids(page.index());
             numbering.vertex(Id::at(ids.start)) < numbering.vertex(Id::at(ids.end))
         };
-        let mut pages: Vec<u32> = (0..store.pages() as u32).filter(is_used).collect();
+        let pages = (0..store.pages()).map(PageNumber::at);
+        let mut pages: Vec<_> = pages.filter(is_used).collect();
         let mut found = [[i32::MAX; 3], [i32::MIN; 3]];
         let mut points = Vec::new();
         for axis in 0..3 {
             for side in 0..2 {
                 // Ascending for the lowest, descending for the highest.
-                let key = |page: u32| {
-                    let page = store.page_box(page as usize);
+                let key = |page: PageNumber| {
+                    let page = store.page_box(page.index());
                     [page.min[axis], -page.max[axis]][side]
                 };
                 pages.sort_unstable_by_key(|page| (key(*page), *page));
@@ -41,7 +42,7 @@ pub fn bounds(
                         break;
                     }
                     workspace.check_cancel()?;
-                    add(store, numbering, page as usize, &mut points, &mut found)?;
+                    add(store, numbering, page.index(), &mut points, &mut found)?;
                 }
             }
         }

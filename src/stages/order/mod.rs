@@ -15,6 +15,7 @@ pub use sample::{Grouped, MOST_GROUPS, cuts, sample_sort};
 pub use store::{PAGE, PointStore};
 pub use writer::{Position, StoreWriter};
 
+use crate::ids::Id;
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::spill::{Sorted, Sorter, row};
 use outcrop_disk::workspace::Workspace;
@@ -208,7 +209,7 @@ impl Orderer {
             Ok((writer.finish()?, runs))
         })?;
         runs.release(workspace)?;
-        let (found, limit) = (store.len() as u64, u64::from(u32::MAX) - 1);
+        let (found, limit) = (store.len() as u64, Id::MOST);
         if found > limit {
             return Err(Error::TooManyPoints { found, limit });
         }

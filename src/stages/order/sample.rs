@@ -6,6 +6,7 @@
 
 use super::files::STEP;
 use super::{CurveKey, Position, Rewriter, StoredPoints};
+use crate::ids::Id;
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::spill::{Shuffle, Table, row};
 use outcrop_disk::workspace::memory::bytes_of;
@@ -306,7 +307,7 @@ fn sort_in_groups(
     let page = page.max(1);
     let merged = Buckets::merge(&sent, cuts.len() + 1, STEP * page, workspace)?;
     sent.release(workspace)?;
-    let (found, limit) = (merged.len() as u64, u64::from(u32::MAX) - 1);
+    let (found, limit) = (merged.len() as u64, Id::MOST);
     if found > limit {
         return Err(Error::TooManyPoints { found, limit });
     }

@@ -2,7 +2,7 @@
 
 use super::files::{STEP, StoreFiles, StoredPoints, index_of};
 use super::packed::Packing;
-use crate::ids::Id;
+use crate::ids::{Id, PageNumber};
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::file::ScratchFile;
@@ -181,11 +181,17 @@ impl PointStore {
 
     /// Replaces `found` by the pages whose box is within `reach` of `target`, ascending; if there are more
     /// than `most`, by some of them, and returns false.
-    pub fn pages_near(&self, target: &Aabb, reach: u64, most: usize, found: &mut Vec<u32>) -> bool {
+    pub fn pages_near(
+        &self,
+        target: &Aabb,
+        reach: u64,
+        most: usize,
+        found: &mut Vec<PageNumber>,
+    ) -> bool {
         found.clear();
         let near = |page: &usize| self.boxes[*page].distance2_box(target) <= reach * reach;
         for group in self.tree.meeting(target.wide(reach as i64)) {
-            found.extend(self.group(group).filter(near).map(|page| page as u32));
+            found.extend(self.group(group).filter(near).map(PageNumber::at));
             if found.len() > most {
                 return false;
             }

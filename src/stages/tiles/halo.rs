@@ -3,6 +3,7 @@
 
 use super::MOST_HALO;
 use super::candidates::within;
+use crate::ids::PageNumber;
 use crate::order::PointStore;
 use outcrop_geom::aabb::Aabb;
 use outcrop_geom::kernels::{BLOCK, CoveredBoxes, Level, near_boxes};
@@ -33,7 +34,7 @@ pub(super) struct Reach {
     /// Squared distance, in squared steps.
     pub reach2: u64,
     /// The pages within this distance.
-    pub near: Vec<u32>,
+    pub near: Vec<PageNumber>,
 }
 
 /// All pages of a tile of `size` pages whose pages `own` are queried, and the reaches of the latter. Reaches
@@ -53,7 +54,7 @@ pub(super) fn halo(store: &PointStore, own: &[usize], size: usize) -> (Vec<usize
         let mut reaches: Vec<_> = own.iter().map(near).collect();
         let mut wanted = own.to_vec();
         let near = reaches.iter().flat_map(|reach| &reach.near);
-        wanted.extend(near.map(|page| *page as usize));
+        wanted.extend(near.map(|page| page.index()));
         wanted.sort_unstable();
         wanted.dedup();
         if wanted.len() <= most || shrink > 1 << 40 {
@@ -82,7 +83,7 @@ fn share(
         let mut reach = reach(around, short.page, 1);
         while reach * reach > short.reach2 {
             let longer = near_pages(around, short.page, reach, MOST_SHARED);
-            let pages = longer.near.iter().map(|page| *page as usize);
+            let pages = longer.near.iter().map(|page| page.index());
             let mut more: Vec<_> = pages.filter(|p| wanted.binary_search(p).is_err()).collect();
             if more.len() <= left {
                 left -= more.len();
@@ -113,7 +114,7 @@ fn full(longest: i64) -> u64 {
 
 /// The longest reach, up to `reach`, that touches at most `most` pages; found by halving.
 fn near_pages(around: &mut ReachablePages<'_>, page: usize, mut reach: u64, most: usize) -> Reach {
-    let mut near = vec![page as u32];
+    let mut near = vec![PageNumber::at(page)];
     while reach > 0 {
         if let (found, true) = around.pages(page, reach, most) {
             near = found.to_vec();
@@ -140,7 +141,7 @@ struct ReachablePages<'a> {
     /// The boxes of the pages within `reach` of the tile's box, with their numbers.
     boxes: CoveredBoxes,
     reach: u64,
-    found: Vec<u32>,
+    found: Vec<PageNumber>,
 }
 
 impl<'a> ReachablePages<'a> {
@@ -161,8 +162,8 @@ impl<'a> ReachablePages<'a> {
         if store.pages_near(&all, around.reach, most, &mut around.found) {
             around.boxes.set(|boxes| {
                 for &page in &around.found {
-                    let Aabb { min, max } = *store.page_box(page as usize);
-                    boxes.push(min, max, page);
+                    let Aabb { min, max } = *store.page_box(page.index());
+                    boxes.push(min, max, page.get());
                 }
             });
         } else {
@@ -173,12 +174,14 @@ impl<'a> ReachablePages<'a> {
 
     /// The pages within `reach` of a page of the tile, ascending, and true, if there are at most `most`; else
     /// only some of them, and false.
-    fn pages(&mut self, page: usize, reach: u64, most: usize) -> (&[u32], bool) {
+    fn pages(&mut self, page: usize, reach: u64, most: usize) -> (&[PageNumber], bool) {
         let bounds = self.store.page_box(page);
         if reach <= self.reach {
             let limit = within(bounds, reach * reach);
-            self.found.resize(self.boxes.len() + BLOCK, 0);
-            let count = near_boxes(self.level, &self.boxes, limit, &mut self.found);
+            self.found
+                .resize(self.boxes.len() + BLOCK, PageNumber::default());
+            let found = bytemuck::cast_slice_mut(&mut self.found);
+            let count = near_boxes(self.level, &self.boxes, limit, found);
             return (&self.found[..count], count <= most);
         }
         let all = (self.store).pages_near(bounds, reach, most, &mut self.found);

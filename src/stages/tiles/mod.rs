@@ -12,6 +12,7 @@ mod points;
 pub mod walk;
 pub mod wanted;
 
+use crate::ids::PageNumber;
 use crate::order::PointStore;
 use halo::{Reach, halo};
 use outcrop_disk::error::Result;
@@ -152,7 +153,7 @@ impl Tile {
         }
         for reach in reaches {
             let begin = self.near.len();
-            let local = |page: &u32| self.pages.binary_search(&(*page as usize)).ok();
+            let local = |page: &PageNumber| self.pages.binary_search(&page.index()).ok();
             let near = reach.near.iter().filter_map(local);
             self.near.extend(near.map(|local| local as u32));
             if let Ok(local) = self.pages.binary_search(&reach.page) {

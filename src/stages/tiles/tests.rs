@@ -322,10 +322,11 @@ proptest! {
         let mut found = Vec::new();
         for target in (0..store.pages()).step_by(11).map(|page| store.page_box(page)) {
             let reach = (1u64 << far) / 3;
-            let near = |page: &u32| {
-                store.page_box(*page as usize).distance2_box(target) <= reach * reach
+            let near = |page: &PageNumber| {
+                store.page_box(page.index()).distance2_box(target) <= reach * reach
             };
-            let expected: Vec<_> = (0..store.pages() as u32).filter(near).collect();
+            let pages = (0..store.pages()).map(PageNumber::at);
+            let expected: Vec<_> = pages.filter(near).collect();
             let all = store.pages_near(target, reach, most, &mut found);
             prop_assert_eq!(all, expected.len() <= most);
             if all {

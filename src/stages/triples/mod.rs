@@ -2,7 +2,7 @@
 
 use crate::blocks::Blocks;
 use crate::cells::{CellTriples, CountedTriple, SentTriple};
-use crate::ids::{Block, Id, Triangle};
+use crate::ids::{Block, Id, Triangle, same};
 use outcrop_disk::error::Result;
 use outcrop_disk::spill::{Shuffle, Table, row};
 use outcrop_disk::workspace::memory::{Reservation, bytes_of};
@@ -163,7 +163,7 @@ fn merge(own: &[CountedTriple], received: &[SentTriple], all: &mut Vec<CountedTr
         };
         let Some(next) = next else { break };
         match all.last_mut() {
-            Some(last) if last.triple == next.triple => last.count += next.count,
+            Some(last) if same(last.triple, next.triple) => last.count += next.count,
             _ => all.push(next),
         }
     }
