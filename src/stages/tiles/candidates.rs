@@ -1,6 +1,7 @@
 //! The points that may be neighbours of a query, in columns.
 
 use super::{LEAVES, OwnPage, Tile};
+use crate::ids::Id;
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_geom::Point;
 use outcrop_geom::aabb::Aabb;
@@ -203,7 +204,7 @@ fn pick_leaves_body<P: Pick>(
             continue;
         };
         let local = leaf as usize / LEAVES;
-        let first = tile.id(local, range.start - tile.range(local).start) as u32;
+        let first = Id::at(tile.id(local, range.start - tile.range(local).start)).get();
         for start in range.clone().step_by(BLOCK) {
             let Some(columns) = tile.points.block(start) else {
                 break;

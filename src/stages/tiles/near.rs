@@ -8,6 +8,7 @@ use super::candidates::{APPROXIMATE, Candidates, Columns, PageLeaves, above};
 use super::neighbors::Neighbors;
 use super::wanted::Wanted;
 use super::{OwnPage, Tile};
+use crate::ids::Id;
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_geom::aabb::Aabb;
 use outcrop_geom::kernels::{BLOCK, Level};
@@ -139,7 +140,7 @@ impl Tile {
             let mut farthest = 0;
             for (id, index) in (first..).zip(group) {
                 if wanted(id) {
-                    farthest = one(own, index, id as u32, search).max(farthest);
+                    farthest = one(own, index, Id::at(id).get(), search).max(farthest);
                     search.swap_back();
                 }
             }

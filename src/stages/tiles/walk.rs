@@ -4,6 +4,7 @@
 use super::Near;
 use super::neighbors::Neighbors;
 use super::wanted::{All, Wanted};
+use crate::ids::Id;
 use crate::order::PointStore;
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::memory::bytes_of;
@@ -232,7 +233,7 @@ impl<'a> Walk<'a> {
 
     /// Adds the `wanted` points of a page; those within `limit` are ready.
     fn open(&mut self, page: usize, limit: u64, wanted: &impl Wanted) -> Result<()> {
-        let first = self.store.page_ids(page).start as u32;
+        let first = Id::at(self.store.page_ids(page).start).get();
         let columns = self.cache.get(self.store, page)?;
         self.places.clear();
         wanted.pick(columns, &mut self.places);

@@ -2,6 +2,7 @@
 
 use super::sums::{Unknown, certain_body, divided_body};
 use super::{APPROXIMATE, OwnPage, Query, Search, Sums};
+use crate::ids::Id;
 use crate::tiles::Tile;
 use outcrop_geom::clip::wrap::{MOST_NEIGHBORS, TOGETHER};
 use outcrop_geom::kernels::{BLOCK, Pick, SUMMED_LIMIT2, kernel, second_moments_body};
@@ -143,7 +144,7 @@ impl Tile {
                     let count = members.len().min(ids.end - begin);
                     let members = &mut members[..count];
                     for (id, member) in (begin..).zip(&mut *members) {
-                        member.id = id as u32;
+                        member.id = Id::at(id).get();
                         member.index = leaf.start + (id - first);
                         member.point = self.points.get(member.index);
                         member.sums = None;
