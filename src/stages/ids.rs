@@ -286,3 +286,46 @@ impl Ids {
         self.start.index()..self.end.index()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn places_are_those_in_the_range(start in 0u32..50, length in 0u32..50, id in any::<Width>()) {
+            let ids = Ids::of(start..start + length);
+            let id = if id % 2 == 0 { id % 100 } else { id };
+            let place = (start..start + length).position(|x| x == id);
+            let id = Id::new(id);
+            prop_assert_eq!(ids.contains(&id), place.is_some());
+            prop_assert_eq!(Some(ids.find(id)).filter(|place| *place < ids.len()), place);
+            if let Some(place) = place {
+                prop_assert_eq!((ids.place(id), ids.id(place)), (place, id));
+            }
+            let all: Vec<usize> = ids.iter().map(Id::index).collect();
+            prop_assert_eq!(all, ids.indices().collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn on_disk_they_are_the_plain_numbers() {
+        let ids = [Id::new(7), Id::at(70_000), Id::NONE];
+        assert_eq!(
+            bytemuck::cast_slice::<Id, u8>(&ids),
+            [7, 70_000, Width::MAX]
+                .map(Width::to_ne_bytes)
+                .as_flattened()
+        );
+        assert_eq!(ids[1].words(), [70_000]);
+    }
+
+    #[test]
+    fn the_other_of_two_is_found_from_either() {
+        let [a, b] = [3, 70_001].map(Id::new);
+        assert_eq!((a.other([a, b]), b.other([a, b])), (b, a));
+        assert!(same(triangle([1, 2, 3]), triangle([1, 2, 3])));
+        assert!(!same(triangle([1, 2, 3]), triangle([1, 2, 4])));
+    }
+}

@@ -237,4 +237,18 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn a_constraint_in_a_word_comes_back() {
+        for (label, flip) in [(0u32, false), (0, true), (5, true), ((1 << 31) - 1, false)] {
+            let turned = word((label, flip));
+            assert_eq!(constraint(turned), (label, flip));
+            assert_eq!(constraint(turned.turn(true)), (label, !flip));
+            assert_eq!(turned.turn(false), turned);
+            assert_eq!(
+                bytemuck::cast::<_, u32>(turned),
+                label << 1 | u32::from(flip)
+            );
+        }
+    }
 }
