@@ -145,7 +145,8 @@ fn hold(bytes: u64) {
 /// # Errors
 /// A message about a fault that does not exist.
 pub fn install() -> Result<(), String> {
-    let Some(text) = std::env::var_os(VARIABLE) else {
+    let text = std::env::var_os(VARIABLE).filter(|text| !text.is_empty());
+    let Some(text) = text else {
         return Ok(());
     };
     let plan = text.to_str().and_then(Plan::read).ok_or_else(|| {
