@@ -35,7 +35,7 @@ pub enum Error {
         found: String,
         /// The expected content.
         expected: String,
-        /// What helps.
+        /// What the user can do about it; none if nothing is known.
         remedies: Vec<Remedy>,
     },
     /// The cloud has too few distinct points for a triangle.
@@ -79,7 +79,7 @@ pub enum Error {
     NoTriangles {
         /// The reason.
         why: String,
-        /// What helps.
+        /// What the user can do about it; none if nothing is known.
         remedies: Vec<Remedy>,
     },
     /// A parameter is out of range.
@@ -163,7 +163,7 @@ pub enum Error {
         path: PathBuf,
         /// The reason.
         why: String,
-        /// What helps.
+        /// What the user can do about it; none if nothing is known.
         remedies: Vec<Remedy>,
     },
     /// A part of the program that was left out of this build is needed.

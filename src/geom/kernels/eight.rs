@@ -14,8 +14,6 @@ pub trait Eight: Numbers {
     const PARTS: usize;
     /// Loads a part from memory.
     fn load_part(from: &[f64; 8], part: usize) -> Self::Part;
-    /// Stores a part to memory.
-    fn store_part(from: Self::Part, part: usize, to: &mut [f64; 8]);
     /// The eight numbers of the first and the last part.
     fn of_parts(first: Self::Part, last: Self::Part) -> Self;
     /// Loads from memory.
@@ -148,11 +146,6 @@ impl Eight for Base {
     #[inline(always)]
     fn load_part(from: &[f64; 8], _: usize) -> Self {
         Self::load(from)
-    }
-
-    #[inline(always)]
-    fn store_part(from: Self, _: usize, to: &mut [f64; 8]) {
-        from.store(to);
     }
 
     #[inline(always)]

@@ -12,7 +12,7 @@ use outcrop_geom::{Point, distance2};
 
 /// The mesh around candidates, which grows as they are inserted.
 pub trait Mesh: Neighborhood {
-    /// What components are numbered by.
+    /// The type of a component's number.
     type Part: Number;
     /// Time of the last insertion of a triangle at a vertex of a candidate; 0 if there was none.
     fn changed(&self, v: Id) -> u32;

@@ -93,13 +93,6 @@ impl Eight for Avx2 {
     }
 
     #[inline(always)]
-    fn store_part(from: Four, part: usize, to: &mut [f64; 8]) {
-        let half = &mut to.as_chunks_mut::<4>().0[part];
-        // SAFETY: see above; a part is four numbers.
-        unsafe { _mm256_storeu_pd(half.as_mut_ptr(), from.0) }
-    }
-
-    #[inline(always)]
     fn of_parts(first: Four, last: Four) -> Self {
         Self(first, last)
     }
@@ -252,11 +245,6 @@ impl Eight for Avx512 {
     #[inline(always)]
     fn load_part(from: &[f64; 8], _: usize) -> Self {
         Self::load(from)
-    }
-
-    #[inline(always)]
-    fn store_part(from: Self, _: usize, to: &mut [f64; 8]) {
-        from.store(to);
     }
 
     #[inline(always)]
