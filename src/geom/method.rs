@@ -38,8 +38,8 @@ constants! {
         /// One in this number of runs is sampled to find the regions with noise. More samples cost time on clean
         /// clouds.
         sample: usize = 8, "runs";
-        /// Length of a block, in which T12 triangles are inserted and edges flipped, and of a region, whose
-        /// points are examined if its samples show noise.
+        /// Length of a block, in which T12 triangles are inserted, and of a region, whose points are
+        /// examined if its samples show noise.
         block: u32 = 1 << 16, "ids";
     }
     /// The plane fitted to a point's neighbours.
@@ -59,7 +59,8 @@ constants! {
     /// The disk to which a cell is restricted.
     disk: Disk {
         /// Radius. On uniform samples, including their boundaries, disks of this size see 99.9 % of the
-        /// triangles that very large disks see.
+        /// triangles that very large disks see. A point whose neighbours reach farther than the disks of its
+        /// region can be off the surface.
         reach: f64 = 2.0, "distances of the last neighbour";
     }
     /// Normals that points bring.
@@ -79,23 +80,14 @@ constants! {
     }
     /// Outliers, which are dropped on request.
     outliers: Outliers {
-        /// Neighbours whose median spacing is the reference: so many that most are on the surface, while the
-        /// nearest neighbours of an outlier can be outliers too. A spacing is that of `noise.nearest`.
-        around: usize = 64, "points";
         /// Most rounds. Another round finds outliers for which even the reference consists of outliers.
         rounds: u32 = 4, "rounds";
     }
     /// Points off the surface, such as birds, dust and wires.
     off_surface: OffSurface {
-        /// A point can be off the surface if its neighbours reach more than this many usual reaches of its
-        /// region. With 3, a third of the points strewn a few spacings beside a surface stay in the mesh.
-        far: u128 = 2, "usual reaches";
-        /// The usual reach of a patch is the quantile of its samples with this denominator: the lower
-        /// quartile.
-        quantile: usize = 4, "one in";
-        /// Such a point is off the surface if its neighbours fill space: their scatter along the normal is
-        /// more than one part in this number of the total scatter. On a surface with noise of one spacing it
-        /// is a sixth.
+        /// A point whose neighbours reach far is off the surface if they fill space: their scatter along the
+        /// normal is more than one part in this number of the total scatter. On a surface with noise of one
+        /// spacing it is a sixth.
         space: f64 = 7.0, "one part in", [6.0, 9.0];
         /// Or if it is farther from the plane of its neighbours than this share of their reach. A bird over
         /// the ground is above it, a coarse point beside a dense area is not. Nor does smoothing move a point
@@ -104,8 +96,6 @@ constants! {
     }
     /// Smoothing by a curved surface, which also distinguishes edges from noise.
     smoothing: Smoothing {
-        /// Halvings of the lattice step before points move, so that rounding does not undo the movement.
-        halvings: u32 = 10, "times";
         /// Neighbours for a curved surface: it has more unknowns than a plane and needs more points. With 3, each
         /// round takes a quarter longer, and fine details go: of a part with thin fins a hundredth more is lost.
         neighbors: usize = 2, "times those of a plane", [1, 3];
@@ -161,7 +151,9 @@ constants! {
     }
     /// Orientation of the surface, and the cuts where it is one-sided.
     orientation: Orientation {
-        /// Weight of an edge where the surface is flat; the weight of a fold is 1.
+        /// Weight of an edge where the surface is flat, and of the square root of the evidence that a part faces
+        /// up; the weight of a fold is 1. With 48 for the evidence an aerial scan has 6 % more boundary, with 0
+        /// three quarters more of its area faces down.
         flattest: i64 = 16, "weight";
         /// Where the cosine between triangles is larger, the surface is not cut.
         flat: f64 = 0.9, "cosine", [0.8, 0.95];
@@ -173,9 +165,6 @@ constants! {
         cluster: u64 = 1024, "triangles";
         /// Points for each vertical column of space, whose highest point faces up.
         column: u64 = 64, "points";
-        /// Weight of the square root of the evidence that a part faces up. With 48 an aerial scan has 6 %
-        /// more boundary, with 0 three quarters more of its area faces down.
-        upward: i64 = 16, "weight";
         /// Least evidence that fixes the orientation of a piece without connections. With 0 an aerial scan
         /// loses 0.1 % of its points, and 5 % more triangles are cut.
         held: i64 = 1024, "evidence";
@@ -187,19 +176,6 @@ constants! {
         edge: f64 = 8.0, "local spacings";
         /// Default largest angle between the normals of a T12 triangle and its neighbours (paper: 60).
         angle: f64 = 143.0, "degrees", [100.0, 180.0];
-    }
-    /// Edge flips where points were relaxed.
-    flips: Flips {
-        /// Least sum of bends at the five edges of a quadrilateral for which a flip is considered; a bend is
-        /// the distance of two unit normals.
-        bent: f32 = 1.2, "sum of bends";
-        /// Least decrease of this sum by a flip.
-        gain: f32 = 0.1, "sum of bends";
-        /// Approximate least sine of the smallest angle of new triangles, unless the old ones were more
-        /// slender.
-        slender: f64 = 0.2, "sine";
-        /// Most sweeps over a block.
-        sweeps: usize = 3, "sweeps";
     }
     /// Holes that are filled.
     filling: Filling {
@@ -233,9 +209,7 @@ constants! {
     components: Components {
         /// Least number of triangles (paper: 10).
         least: u64 = 10, "triangles";
-        /// A component is noisy if at least one in this number of its triangles is at a noisy point.
-        noisy: u64 = 2, "one in";
-        /// A noisy component needs one triangle for each of this number of points of the cloud.
+        /// A component half of whose triangles are at noisy points needs one triangle for each of this number of points of the cloud.
         each_if_noisy: u64 = 5000, "points";
         /// Largest number of triangles that a noisy component needs.
         most_if_noisy: u64 = 150, "triangles";

@@ -232,7 +232,6 @@ fn output(report: &Report, mesh: &Path) -> Markup {
         ("components found", repair.components_found),
         ("small components removed", repair.components_removed),
         ("their triangles", repair.component_triangles_removed),
-        ("edges flipped", repair.edges_flipped),
         ("bridges removed", repair.bridges_removed),
         ("gaps of one triangle closed", repair.gaps_closed),
         ("boundary loops found", repair.holes_found),

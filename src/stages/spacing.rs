@@ -103,7 +103,8 @@ pub struct Density<'a> {
 /// True if neighbours at squared distances up to `last2` reach farther than those of a surface with the usual
 /// reach `usual2`.
 fn is_far(last2: u64, usual2: u64) -> bool {
-    u128::from(last2) > METHOD.off_surface.far * METHOD.off_surface.far * u128::from(usual2)
+    let reach = METHOD.disk.reach;
+    last2 as f64 > reach * reach * usual2 as f64
 }
 
 /// The square of the local spacing: the mean spacing of `neighbors` points that fill a plane disk of squared

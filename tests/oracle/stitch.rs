@@ -146,7 +146,6 @@ fn pipeline(
         min_component: settings.min_component as u64,
         min_noisy_component: settings.min_component as u64,
         max_hole_edges: settings.max_hole_edges,
-        flip: settings.robust,
         clip_ears: settings.robust,
     };
     let (repaired, mended) = repair(places, stitched, blocks, options, workspace)?;
@@ -438,7 +437,6 @@ fn compare(
         reached.flat += c.flat;
         reached.flat_candidates += c.flat_candidates;
         reached.met.add(&c.met);
-        reached.flips += c.flips;
         reached.holes.filled += c.holes.filled;
         reached.holes.partly += c.holes.partly;
         reached.holes.clipped_whole += c.holes.clipped_whole;
@@ -521,7 +519,6 @@ fn arbitrary_triples_the_robust_way() {
         reached.one_sided,
         reached.flat,
         reached.flat_candidates,
-        reached.flips,
         holes.filled,
         holes.partly,
         holes.clipped_whole,

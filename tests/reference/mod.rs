@@ -13,7 +13,6 @@ pub mod clouds;
 pub mod contract;
 pub mod edges;
 pub mod evidence;
-pub mod flips;
 pub mod holes;
 pub mod homes;
 pub mod insert;
@@ -190,7 +189,6 @@ pub struct Counts {
     pub merges: usize,
     pub merges_reverted: usize,
     pub rejected: Rejected,
-    pub flips: usize,
     pub bridges: usize,
     pub small_components: usize,
     /// Triangles of the small components.
@@ -338,7 +336,7 @@ pub fn connect(
     }
 }
 
-/// Section 8: flips, bridges, small components, orientation of components, holes, in this order. Returns the
+/// Section 8: bridges, small components, orientation of components, holes, in this order. Returns the
 /// orientations of the triangles.
 fn repair_and_orient(
     shape: &[Point],
@@ -350,9 +348,6 @@ fn repair_and_orient(
     counts: &mut Counts,
 ) -> Component {
     if settings.repair {
-        if settings.robust {
-            counts.flips = flips::flip(file, shape, surface, settings.block);
-        }
         counts.bridges = repair::remove_bridges(surface);
         (counts.small_components, counts.small_triangles) =
             repair::remove_small_components(surface, settings.min_component);

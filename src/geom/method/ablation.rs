@@ -1,4 +1,4 @@
-//! Other values of the constants, from the environment: `OUTCROP_ABLATION=flips.gain=0.2,relax.rough=0.3`.
+//! Other values of the constants, from the environment: `OUTCROP_ABLATION=filling.slender=3,noise.floor=0.03`.
 
 use super::{Constants, VALUES};
 use std::fmt::Write;
@@ -17,7 +17,7 @@ fn read() -> Result<Constants, String> {
     for part in asked.split(',').filter(|part| !part.is_empty()) {
         let (name, value) = part
             .split_once('=')
-            .ok_or_else(|| format!("{part:?} is not like flips.gain=0.2"))?;
+            .ok_or_else(|| format!("{part:?} is not like filling.slender=3"))?;
         constants.set(name.trim(), value.trim())?;
     }
     Ok(constants)

@@ -2,10 +2,10 @@
 //! the paper).
 //!
 //! The *spacing* of a point is the mean distance to its 8 nearest neighbours. A point is dropped if its
-//! spacing is larger than a factor times the median of the spacings of its 64 nearest neighbours. The second
+//! spacing is larger than a factor times the median of the spacings of its 60 nearest neighbours. The second
 //! neighbourhood is much larger than the first, since the nearest neighbours of an outlier are often outliers
 //! themselves, alone or in small clusters; the median of many is that of the surface. Where outliers are so
-//! far off that even these 64 are outliers, another round finds them, after the ones nearer to the surface
+//! far off that even these 60 are outliers, another round finds them, after the ones nearer to the surface
 //! have been dropped.
 
 mod spacing;
@@ -114,7 +114,9 @@ fn one_tile(
     factor: f64,
     mut spacings: SpacingCache<'_>,
 ) -> Result<Vec<Point>> {
-    let count = METHOD.outliers.around.min(store.len() - 1);
+    // As many as a curved surface has: most are on the surface.
+    let around = METHOD.plane.neighbors * METHOD.smoothing.neighbors;
+    let count = around.min(store.len() - 1);
     let mut kept = vec![None; ids.len()];
     let mut failed = Ok(());
     let of = |id, near: &Neighbors| {

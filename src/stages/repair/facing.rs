@@ -121,7 +121,7 @@ impl Sums {
     }
 
     fn is_noisy(&self) -> bool {
-        METHOD.components.noisy * self.noisy >= self.triangles
+        2 * self.noisy >= self.triangles
     }
 
     /// Records that there is a boundary edge.

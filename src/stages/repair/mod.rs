@@ -1,5 +1,4 @@
-//! Post-processing (paper, section 3.6): bridges, small components, orientation of components, holes; and
-//! edge flips.
+//! Post-processing (paper, section 3.6): bridges, small components, orientation of components, holes.
 //!
 //! It works block by block and uses only triangles and positions, not the way in which the triangles were
 //! found.
@@ -11,7 +10,6 @@ mod components;
 mod ear_clipping;
 mod facing;
 mod fill;
-mod flips;
 mod holes;
 mod loops;
 mod parts;
@@ -102,8 +100,6 @@ pub struct RepairOptions {
     pub min_noisy_component: u64,
     /// Holes of up to this many edges are filled.
     pub max_hole_edges: usize,
-    /// Flip edges where this makes the surface bend less.
-    pub flip: bool,
     /// Close torn boundaries of any length by ear clipping, and do not fill openings.
     pub clip_ears: bool,
 }
@@ -111,8 +107,6 @@ pub struct RepairOptions {
 /// Counts of this stage.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, PartialEq, Eq)]
 pub struct RepairStats {
-    /// Edges flipped.
-    pub edges_flipped: u64,
     /// Bridge triangles removed.
     pub bridges_removed: u64,
     /// Edge-connected components before the removal of small ones.
@@ -162,8 +156,8 @@ impl RepairOptions {
 }
 
 adds!(
-    RepairStats: edges_flipped, bridges_removed, components_found, components_removed,
-    component_triangles_removed, gaps_closed, holes_found, holes_filled, holes_clipped,
+    RepairStats: bridges_removed, components_found, components_removed, component_triangles_removed,
+    gaps_closed, holes_found, holes_filled, holes_clipped,
     holes_outline, holes_too_long, holes_not_filled, hole_triangles
 );
 

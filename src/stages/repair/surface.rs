@@ -7,7 +7,6 @@
 use super::around::Around;
 use super::components::{Parts, join};
 use super::facing::{Fate, Sums, SumsRow, judge};
-use super::flips::Sheet;
 use super::patch::Patch;
 use super::rows::{LabelRun, RimBits, SeenTriangle};
 use super::{OrientedTriangle, RepairOptions, RepairStats, SurfaceTriangle, bridges};
@@ -290,18 +289,11 @@ impl Build<'_> {
     fn block(&self, unit: &Unit<'_>, around: &Around<'_>) -> Result<(u32, RepairStats)> {
         let block = unit.number();
         let ids = self.blocks.ids(block);
-        let mut triangles = around.load(unit, block)?;
-        let range = ids.indices();
-        let shape = self.places.shape.slice(range.clone())?;
+        let triangles = around.load(unit, block)?;
+        let shape = self.places.shape.slice(ids.indices())?;
         let lists = bytes_of(&triangles) + bytes_of(&shape);
         let mut held = unit.hold(lists);
         let mut stats = RepairStats::default();
-        if self.options.repair && self.options.flip && self.places.differ() {
-            let points = self.places.file.slice(range)?;
-            let sheet = Sheet::of(ids, &triangles, &points, &shape);
-            held.set(lists + bytes_of(&points) + sheet.bytes());
-            stats.edges_flipped = sheet.flip(&mut triangles);
-        }
         held.set(lists + Patch::estimate(triangles.len(), ids.len()));
         let patch = Patch::of(ids, &triangles);
         held.set(lists + patch.bytes());

@@ -1,10 +1,9 @@
-//! Tests of filling and ear clipping of single loops, and of edge flips, on synthetic surfaces.
+//! Tests of filling and ear clipping of single loops, on synthetic surfaces.
 
 use super::boundary::LoopRules;
 use super::ear_clipping::zip;
 use super::fill::{Corner, Filling};
-use super::flips;
-use crate::ids::{Id, Ids, Triangle, triangle};
+use crate::ids::{Id, Triangle, triangle};
 use outcrop_geom::{Point, distance2};
 use proptest::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -291,87 +290,5 @@ fn a_wide_door_stays_open() {
         assert_eq!((edges, left), (240, edges - triangles.len()));
         let area: f64 = triangles.iter().map(|t| sheet.area(*t)).sum();
         assert!(area < 0.05 * 600.0 * 600.0, "{area}");
-    }
-}
-
-/// A valley along the diagonal of a grid of six by six points, with all squares split across it or along it.
-fn valley(across: bool) -> (Vec<Point>, Vec<Triangle>) {
-    let point = |n: i32| [10 * (n % 6), 10 * (n / 6), 10 * (n % 6 - n / 6).abs()];
-    let squares = (0..5).flat_map(|y| (0..5).map(move |x| y * 6 + x));
-    let halves = |a: u32| match across {
-        true => [[a, a + 1, a + 6], [a + 1, a + 6, a + 7]],
-        false => [[a, a + 1, a + 7], [a, a + 6, a + 7]],
-    };
-    let mut triangles: Vec<Triangle> = squares.flat_map(halves).map(triangle).collect();
-    triangles.sort_unstable();
-    ((0..36).map(point).collect(), triangles)
-}
-
-/// Flips edges of `triangles`, and returns the number of flips.
-fn flip(ids: Ids, triangles: &mut Vec<Triangle>, points: &[Point], shape: &[Point]) -> u64 {
-    flips::Sheet::of(ids, triangles, points, shape).flip(triangles)
-}
-
-/// Displaced points, as after relaxing.
-fn lifted(points: &[Point]) -> Vec<Point> {
-    points.iter().map(|p| [p[0], p[1], p[2] + 1]).collect()
-}
-
-#[test]
-fn edges_across_a_valley_are_flipped() {
-    let (points, mut triangles) = valley(true);
-    let still = triangles.clone();
-    assert_eq!(flip(Ids::of(0..36), &mut triangles, &points, &points), 0);
-    assert_eq!(triangles, still, "nothing was moved");
-    // The squares at the two ends are at the boundary.
-    assert_eq!(
-        flip(Ids::of(0..36), &mut triangles, &points, &lifted(&points)),
-        3
-    );
-    for a in [7, 14, 21] {
-        assert!(
-            triangles.contains(&triangle([a, a + 1, a + 7])),
-            "{triangles:?}"
-        );
-        assert!(
-            triangles.contains(&triangle([a, a + 6, a + 7])),
-            "{triangles:?}"
-        );
-    }
-    assert!(triangles.is_sorted());
-    assert_eq!(triangles.len(), still.len());
-}
-
-#[test]
-fn what_bends_no_more_than_it_must_stays() {
-    let (points, mut triangles) = valley(false);
-    let still = triangles.clone();
-    assert_eq!(
-        flip(Ids::of(0..36), &mut triangles, &points, &lifted(&points)),
-        0
-    );
-    assert_eq!(triangles, still);
-}
-
-/// The middle of the valley is at the boundary of the block.
-#[test]
-fn what_reaches_out_of_the_block_is_not_flipped() {
-    let (points, all) = valley(true);
-    for ids in [0..14, 15..36].map(Ids::of) {
-        let touches = |t: &&Triangle| t.iter().any(|v| ids.contains(v));
-        let mut triangles: Vec<Triangle> = all.iter().filter(touches).copied().collect();
-        let own = &points[ids.indices()];
-        let before = triangles.clone();
-        flip(ids, &mut triangles, own, &lifted(own));
-        let crossing = |t: &&Triangle| !t.iter().all(|v| ids.contains(v));
-        assert!(
-            before
-                .iter()
-                .filter(crossing)
-                .eq(triangles.iter().filter(crossing))
-        );
-        assert!(
-            triangles.contains(&triangle([14, 15, 20])) == before.contains(&triangle([14, 15, 20]))
-        );
     }
 }

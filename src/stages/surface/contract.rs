@@ -107,7 +107,7 @@ impl<N: Number> Graph<N> {
     /// square root.
     fn upward(&self, node: N) -> i64 {
         let up = self.up[node.index()];
-        up.signum() * METHOD.orientation.upward * up.unsigned_abs().isqrt() as i64
+        up.signum() * METHOD.orientation.flattest * up.unsigned_abs().isqrt() as i64
     }
 
     /// The weight of a pair with this sum.

@@ -19,7 +19,7 @@ struct Plain {
 impl Plain {
     fn up(&self, node: u32) -> i64 {
         let up = self.nodes[node as usize].2;
-        up.signum() * METHOD.orientation.upward * (up.abs() as f64).sqrt().floor() as i64
+        up.signum() * METHOD.orientation.flattest * (up.abs() as f64).sqrt().floor() as i64
     }
 
     fn weight(&self, pair: (u32, u32)) -> i64 {
