@@ -252,10 +252,10 @@ fn options_exist() {
     assert!(unknown.is_empty(), "{unknown:#?}");
 }
 
-/// Rows that the library defines: the name of each, and its fields.
+/// Rows that the library defines: the link to each, and its fields.
 fn rows() -> BTreeMap<String, Vec<String>> {
     let mut all = BTreeMap::new();
-    for text in modules().into_values() {
+    for (module, text) in modules() {
         for definition in text.split("\nrow! {\n").skip(1) {
             let (_, rest) = definition.split_once("struct ").expect("a struct");
             let (name, rest) = rest.split_once(" {").expect("its fields");
@@ -263,30 +263,50 @@ fn rows() -> BTreeMap<String, Vec<String>> {
             let fields = body.lines().map(str::trim);
             let fields = fields.filter_map(|line| line.split_once(": "));
             let fields = fields.map(|(field, _)| field.to_owned()).collect();
-            all.insert(name.to_owned(), fields);
+            let files = [".rs", "/mod.rs"].map(|end| format!("src/{module}{end}"));
+            let file = files.iter().find(|file| root().join(file).exists());
+            all.insert(format!("[`{name}`](../{})", file.expect("a file")), fields);
         }
     }
     assert!(all.len() > 30, "{} rows", all.len());
     all
 }
 
+/// A line of a table of rows with these fields, if it has this link.
+fn with_fields(line: &str, link: &str, fields: &[String]) -> String {
+    let Some((before, rest)) = line.split_once(link) else {
+        return line.to_owned();
+    };
+    let (_, rest) = rest.split_once(" | ").expect("fields");
+    let (listed, rest) = rest.split_once(" | ").expect("a meaning");
+    // A type in brackets may follow.
+    let same = |field: &str| {
+        listed
+            .split(", ")
+            .find(|l| l.split(' ').next() == Some(field))
+    };
+    let fields: Vec<_> = fields.iter().map(|f| same(f).unwrap_or(f)).collect();
+    format!("{before}{link} | {} | {rest}", fields.join(", "))
+}
+
 #[test]
 fn records_are_the_rows_of_the_program() {
     let path = root().join("docs/records.md");
-    let document = std::fs::read_to_string(path).expect("the list of files");
-    let cells = |line: &str| -> Vec<String> { line.split(" | ").map(str::to_owned).collect() };
-    let lines: Vec<Vec<String>> = document.lines().map(cells).collect();
-    for (name, fields) in rows() {
-        let quoted = format!("`{name}`");
-        let line = lines
-            .iter()
-            .find(|line| line.iter().any(|cell| cell.contains(&quoted)));
-        let line = line.unwrap_or_else(|| panic!("docs/records.md has no row {name}"));
-        let place = line.iter().position(|cell| cell.contains(&quoted));
-        let listed = line[place.expect("found") + 1].split(", ");
-        // A type in brackets may follow.
-        let listed: Vec<&str> = listed.filter_map(|field| field.split(' ').next()).collect();
-        assert_eq!(listed, fields, "fields of {name} in docs/records.md");
+    let document = std::fs::read_to_string(&path).expect("the list of files");
+    let mut written = document.clone();
+    for (link, fields) in rows() {
+        assert!(written.contains(&link), "docs/records.md has no row {link}");
+        let lines = written
+            .lines()
+            .map(|line| with_fields(line, &link, &fields) + "\n");
+        written = lines.collect();
+    }
+    if std::env::var_os("OUTCROP_WRITE").is_some() {
+        std::fs::write(&path, &written).expect("the list of files, written");
+    } else {
+        let lines = document.lines().zip(written.lines());
+        let other: Vec<_> = lines.filter(|(a, b)| a != b).collect();
+        assert!(other.is_empty(), "OUTCROP_WRITE=1 writes them: {other:#?}");
     }
     // Files with a name of their own.
     for text in modules().into_values() {
