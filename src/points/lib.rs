@@ -148,22 +148,6 @@ pub fn ingest(inputs: &[PathBuf], workspace: &Workspace) -> Result<Spool> {
     ingest_selected(inputs, &Selection::default(), workspace)
 }
 
-/// As [`ingest`], but reads only points of the wanted classes.
-///
-/// # Errors
-/// See [`ingest`].
-pub fn ingest_classes(
-    inputs: &[PathBuf],
-    classes: &Classes,
-    workspace: &Workspace,
-) -> Result<Spool> {
-    let selection = Selection {
-        classes: classes.clone(),
-        ..Selection::default()
-    };
-    ingest_selected(inputs, &selection, workspace)
-}
-
 /// As [`ingest`], but reads only what is selected.
 ///
 /// # Errors

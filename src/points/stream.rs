@@ -84,21 +84,6 @@ impl Spool {
         Ok(())
     }
 
-    /// As [`Spool::for_each`], on `threads` threads, each with its own [`READ_BUFFERS`].
-    ///
-    /// # Errors
-    /// See [`Spool::for_each`]; the first error of any thread.
-    pub fn par_for_each(
-        &self,
-        workspace: &Workspace,
-        threads: usize,
-        lattice: &Lattice,
-        each: impl Fn(&[Point]) -> Result<()> + Sync,
-    ) -> Result<()> {
-        let frames: Vec<u32> = self.frames().into_iter().map(|frame| frame.0).collect();
-        self.par_for_frames(workspace, threads, lattice, &frames, each)
-    }
-
     /// Streams the points of some `frames`, on `threads` threads, each with its own [`READ_BUFFERS`].
     ///
     /// # Errors

@@ -54,6 +54,11 @@ impl Bench {
     }
 }
 
+/// The numbers of all frames of the spool.
+pub fn frames(spool: &Spool) -> Vec<u32> {
+    spool.frames().into_iter().map(|frame| frame.0).collect()
+}
+
 /// The points of the spool on a lattice, sorted.
 pub fn positions(bench: &Bench, spool: &Spool, lattice: &Lattice) -> Vec<[i32; 3]> {
     let mut all = Vec::new();
@@ -66,7 +71,7 @@ pub fn positions(bench: &Bench, spool: &Spool, lattice: &Lattice) -> Vec<[i32; 3
     all.sort_unstable();
     let parallel = Mutex::new(Vec::new());
     spool
-        .par_for_each(&bench.workspace, 3, lattice, |points| {
+        .par_for_frames(&bench.workspace, 3, lattice, &frames(spool), |points| {
             parallel.lock().unwrap().extend_from_slice(points);
             Ok(())
         })

@@ -5,7 +5,7 @@ use crate::columns::rows;
 use crate::formats::e57::{Scan, cartesian, edited};
 use crate::formats::pcd;
 use e57::{Record, RecordDataType, RecordName, RecordValue};
-use outcrop_points::{Classes, Crop, Selection, ingest_classes, ingest_selected};
+use outcrop_points::{Classes, Crop, Selection, Spool, ingest_selected};
 use std::path::{Path, PathBuf};
 
 /// Point `i` has class `i % 19`; every hundredth is withheld.
@@ -37,6 +37,15 @@ fn write(path: &Path, version: (u8, u8), format: u8, count: i32) {
     writer.close().unwrap();
 }
 
+/// Reads the points of these classes.
+fn read(bench: &Bench, path: &PathBuf, classes: &Classes) -> Spool {
+    let selection = Selection {
+        classes: classes.clone(),
+        ..Selection::default()
+    };
+    ingest_selected(std::slice::from_ref(path), &selection, &bench.workspace).unwrap()
+}
+
 #[test]
 fn classes_are_found_in_every_format() {
     let bench = Bench::new();
@@ -56,8 +65,7 @@ fn classes_are_found_in_every_format() {
                 (Classes::Keep(vec![2, 6]), |c| c == 2 || c == 6),
                 (Classes::Drop(vec![7, 18]), |c| c != 7 && c != 18),
             ] {
-                let paths = std::slice::from_ref(&path);
-                let spool = ingest_classes(paths, &classes, &bench.workspace).unwrap();
+                let spool = read(&bench, &path, &classes);
                 let stats = spool.stats();
                 let present = || (0..count).filter(|i| i % 100 != 0);
                 let kept = present().filter(|i| wanted(i % 19)).count() as u64;
@@ -76,7 +84,7 @@ fn files_without_classes_are_read_whole_and_it_is_said() {
     let points: Vec<[f64; 3]> = (0..50).map(|i| [f64::from(i), 1.0, 2.0]).collect();
     let path: PathBuf = bench.write("a.ply", ply("ascii", "float", false, &points));
     let classes = Classes::Keep(vec![2]);
-    let spool = ingest_classes(&[path], &classes, &bench.workspace).unwrap();
+    let spool = read(&bench, &path, &classes);
     assert_eq!(spool.points(), 50);
     let warnings = &spool.stats().warnings;
     assert!(
@@ -91,7 +99,7 @@ fn what_is_left_out_is_told_if_nothing_is_left() {
     let path = bench.path("a.las");
     write(&path, (1, 2), 0, 10);
     let classes = Classes::Keep(vec![30]);
-    let spool = ingest_classes(&[path], &classes, &bench.workspace).unwrap();
+    let spool = read(&bench, &path, &classes);
     let error = spool.choose_lattice(0).unwrap_err().to_string();
     assert!(
         error.contains("1 withheld, 9 of classes that are not wanted"),
@@ -207,8 +215,7 @@ fn a_column_of_classes_selects_points_in_every_format() {
             (Classes::Drop(vec![7, 18]), |c| c != 7 && c != 18),
         ] {
             let keeps = matches!(classes, Classes::Keep(_));
-            let spool = ingest_classes(std::slice::from_ref(&path), &classes, &bench.workspace);
-            let spool = spool.unwrap();
+            let spool = read(&bench, &path, &classes);
             let stats = spool.stats();
             let kept = (0..COUNT).filter(|i| wanted(class(*i))).count() as u64;
             let more = if keeps { kept_more } else { dropped_more };

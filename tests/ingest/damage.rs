@@ -1,6 +1,6 @@
 //! Damaged files are refused with the place of the damage, without a panic.
 
-use crate::bench::{Bench, cloud, ply, positions, write_las};
+use crate::bench::{Bench, cloud, frames, ply, positions, write_las};
 use crate::formats::{e57, pcd, ptx};
 use ::e57::RecordDataType;
 use outcrop::Error;
@@ -138,7 +138,7 @@ fn a_damaged_spool_is_noticed() {
     }
     std::fs::write(&file, &good[..good.len() / 2]).unwrap();
     let error = spool
-        .par_for_each(&bench.workspace, 2, &lattice, |_| Ok(()))
+        .par_for_frames(&bench.workspace, 2, &lattice, &frames(&spool), |_| Ok(()))
         .unwrap_err();
     assert!(
         error.to_string().contains("scratch file damaged"),

@@ -51,11 +51,9 @@ pub struct ResumableRun {
     scopes: Mutex<Vec<Scope>>,
     /// Steps that were found open for tasks.
     open: Mutex<Vec<OpenStep>>,
-    /// If tasks share the run: the segments that this process made, other files that it wrote to, and the
-    /// segments of others that are to be deleted.
+    /// If tasks share the run: the segments that this process made, and other files that it wrote to.
     made: Mutex<HashSet<PathBuf>>,
     touched: Mutex<HashSet<PathBuf>>,
-    leaving: Mutex<Vec<Leaving>>,
     /// Points of the cloud, as far as they are known.
     pub points: AtomicU64,
     _held: Reservation,
@@ -94,7 +92,6 @@ impl ResumableRun {
             open: Mutex::default(),
             made: Mutex::default(),
             touched: Mutex::default(),
-            leaving: Mutex::default(),
             points: AtomicU64::new(0),
             _held: held,
         }
@@ -133,11 +130,6 @@ impl ResumableRun {
     /// The steps that were found open for tasks.
     pub fn take_open(&self) -> Vec<OpenStep> {
         std::mem::take(&mut *lock(&self.open))
-    }
-
-    /// The segments of other processes that are to be deleted.
-    pub fn take_leaving(&self) -> Vec<Leaving> {
-        std::mem::take(&mut *lock(&self.leaving))
     }
 
     /// The journal of this process.
@@ -329,8 +321,7 @@ impl ResumableRun {
         self.journal.append(Record::Deleted(name.to_owned()))?;
         if self.is_shared() {
             let mut made = lock(&self.made);
-            let (own, others): (Vec<_>, Vec<_>) = leaving.partition(|l| made.remove(&l.0.path));
-            lock(&self.leaving).extend(others);
+            let own: Vec<_> = leaving.filter(|l| made.remove(&l.0.path)).collect();
             return self.keeper.delete(own.into_iter());
         }
         self.keeper.delete(leaving)

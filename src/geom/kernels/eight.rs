@@ -81,6 +81,24 @@ macro_rules! operators {
     };
 }
 
+/// The part of a type that is one register.
+macro_rules! one_part {
+    () => {
+        type Part = Self;
+        const PARTS: usize = 1;
+
+        #[inline(always)]
+        fn load_part(from: &[f64; 8], _: usize) -> Self {
+            Self::load(from)
+        }
+
+        #[inline(always)]
+        fn of_parts(first: Self, _: Self) -> Self {
+            first
+        }
+    };
+}
+
 /// The definition, in plain code.
 #[derive(Debug, Clone, Copy)]
 pub struct Base(pub [f64; 8]);
@@ -140,18 +158,7 @@ impl Numbers for Base {
 }
 
 impl Eight for Base {
-    type Part = Self;
-    const PARTS: usize = 1;
-
-    #[inline(always)]
-    fn load_part(from: &[f64; 8], _: usize) -> Self {
-        Self::load(from)
-    }
-
-    #[inline(always)]
-    fn of_parts(first: Self, _: Self) -> Self {
-        first
-    }
+    one_part! {}
 
     #[inline(always)]
     fn load(from: &[f64; 8]) -> Self {

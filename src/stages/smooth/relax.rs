@@ -51,8 +51,6 @@ pub struct RelaxStats {
     pub largest: f64,
 }
 
-impl RelaxStats {}
-
 /// The number of rounds in which a point with these neighbours moves, itself included: the highest level that
 /// more than nine tenths of them reach.
 fn rounds(levels: &Levels, around: &Around) -> u8 {

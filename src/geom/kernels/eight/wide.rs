@@ -239,18 +239,7 @@ impl Numbers for Avx512 {
 }
 
 impl Eight for Avx512 {
-    type Part = Self;
-    const PARTS: usize = 1;
-
-    #[inline(always)]
-    fn load_part(from: &[f64; 8], _: usize) -> Self {
-        Self::load(from)
-    }
-
-    #[inline(always)]
-    fn of_parts(first: Self, _: Self) -> Self {
-        first
-    }
+    one_part! {}
 
     #[inline(always)]
     fn load(from: &[f64; 8]) -> Self {
