@@ -10,21 +10,19 @@ const MANY_LEFT: f64 = 0.05;
 /// Share of duplicates that is worth a word.
 const MANY_DUPLICATES: f64 = 0.05;
 
+pub const GIVEN_TWICE: &str = "Were files, or overlapping flight lines, given twice?";
+
+/// That points have the position of another one.
+pub fn duplicates(number: u64, kept: u64) -> String {
+    let share = percent(number as f64, kept as f64);
+    format!("{number} points ({share}) have the position of another one.")
+}
+
 /// Warnings of the run, and what follows from its counts.
 pub fn of_report(report: &Report) -> Vec<Advice> {
-    let warning = |words: &String| Advice {
-        words: words.clone(),
-        remedy: String::new(),
-        warning: true,
-    };
+    let warning = |words: &String| Advice::new(true, words.clone(), "");
     let mut all: Vec<Advice> = report.warnings.iter().map(warning).collect();
-    let mut note = |warning: bool, words: String, remedy: &str| {
-        all.push(Advice {
-            words,
-            remedy: remedy.to_owned(),
-            warning,
-        });
-    };
+    let mut note = |warning, words, remedy: &str| all.push(Advice::new(warning, words, remedy));
     let share = |part: u64, whole: u64| part as f64 / whole.max(1) as f64;
     let (points, mesh, repair) = (report.points, &report.mesh, &report.repair);
     let unused = points.saturating_sub(mesh.points_used);
@@ -60,16 +58,8 @@ pub fn of_report(report: &Report) -> Vec<Advice> {
         note(false, words, "A larger --max-hole-edges fills longer ones.");
     }
     if share(report.duplicates_folded, report.input.kept) > MANY_DUPLICATES {
-        let words = format!(
-            "{} points ({}) have the position of another one.",
-            report.duplicates_folded,
-            percent(report.duplicates_folded as f64, report.input.kept as f64)
-        );
-        note(
-            false,
-            words,
-            "Were files, or overlapping flight lines, given twice?",
-        );
+        let words = duplicates(report.duplicates_folded, report.input.kept);
+        note(false, words, GIVEN_TWICE);
     }
     if report.input.crs.is_none() {
         let mixed = report.input.files.iter().any(|file| file.crs.is_some());

@@ -1,6 +1,6 @@
 //! Charts as inline SVG.
 
-use super::words::{bytes, count, length, seconds};
+use super::words::{bytes, count, length, seconds, spread};
 use maud::{Markup, html};
 use outcrop_draw::histogram::{Bin, Histogram};
 
@@ -23,8 +23,7 @@ pub fn lengths(name: &str, histogram: &Histogram, note: &str) -> Markup {
         .map(|n| (n as f64 / bins as f64, length(edge(n))))
         .collect();
     let line = html! {
-        "median " (length(histogram.p50)) ", 5 to 95 %: " (length(histogram.p5)) " to "
-        (length(histogram.p95)) ", longest " (length(histogram.max))
+        (spread(histogram.p5, histogram.p50, histogram.p95)) ", longest " (length(histogram.max))
     };
     chart(name, histogram, &label, &ticks, &line, note)
 }

@@ -1,9 +1,12 @@
 //! The page of a cloud.
 
+use super::advice::{GIVEN_TWICE, duplicates};
 use super::charts::lengths;
 use super::report::{bounds, files};
-use super::sheet::{Advice, Sheet, advice, card, list, table, view};
-use super::words::{bytes, clean, count, counted, file_name, length, percent, position, seconds};
+use super::sheet::{Advice, advice, card, lattice, list, sheet, shown, table, view};
+use super::words::{
+    bytes, clean, count, counted, file_name, length, percent, position, seconds, spread,
+};
 use crate::info::{Illustration, Info, Percentiles};
 use maud::{Markup, html};
 use std::path::PathBuf;
@@ -56,13 +59,7 @@ pub fn cloud(inputs: &[PathBuf], info: &Info, illustration: &Illustration) -> St
         div.panel { (needs(info)) }
     };
     let line = html! { (counted(info.input.files.len() as u64, "file")) ", " (count(info.points)) " distinct points" };
-    let sheet = Sheet {
-        kind: "Point cloud",
-        title: &title,
-        line,
-        body,
-    };
-    sheet.html()
+    sheet("Point cloud", &title, &line, &body)
 }
 
 fn cards(info: &Info) -> Markup {
@@ -86,13 +83,7 @@ fn cards(info: &Info) -> Markup {
 
 fn words(info: &Info) -> Vec<Advice> {
     let mut all: Vec<Advice> = Vec::new();
-    let mut say = |warning: bool, words: String, remedy: &str| {
-        all.push(Advice {
-            words,
-            remedy: remedy.to_owned(),
-            warning,
-        });
-    };
+    let mut say = |warning, words, remedy: &str| all.push(Advice::new(warning, words, remedy));
     let input = &info.input;
     for warning in &input.warnings {
         say(true, warning.clone(), "");
@@ -116,16 +107,8 @@ fn words(info: &Info) -> Vec<Advice> {
         say(true, words, "");
     }
     if info.duplicates > info.input.kept / 20 {
-        let words = format!(
-            "{} points ({}) have the position of another one.",
-            info.duplicates,
-            percent(info.duplicates as f64, info.input.kept as f64)
-        );
-        say(
-            false,
-            words,
-            "Were files, or overlapping flight lines, given twice?",
-        );
+        let words = duplicates(info.duplicates, info.input.kept);
+        say(false, words, GIVEN_TWICE);
     }
     if !info.lattice_exact {
         let words = format!(
@@ -181,29 +164,20 @@ fn points(info: &Info) -> Markup {
             "outside the region",
             some(input.dropped_by_crop + input.skipped_by_crop),
         ),
-        ("columns", Some(html! { (clean(&info.columns())) })),
+        ("columns", shown(clean(&info.columns()))),
         (
             "reference system",
             Some(html! {
                 @match &input.crs { Some(crs) => (clean(&crs.described())), None => "not given" }
             }),
         ),
-        ("lowest corner", Some(html! { (position(info.min, step)) })),
-        ("highest corner", Some(html! { (position(info.max, step)) })),
+        ("lowest corner", shown(position(info.min, step))),
+        ("highest corner", shown(position(info.max, step))),
         (
             "box of the files",
-            bounds(input).map(|[low, high]| {
-                html! {
-                    (position(low, step)) " to " (position(high, step))
-                }
-            }),
+            bounds(input).and_then(|b| shown(b.map(|p| position(p, step)).join(" to "))),
         ),
-        (
-            "lattice",
-            Some(html! {
-                "steps of " (length(step)) @if info.lattice_exact { ", exact" } @else { ", rounded" }
-            }),
-        ),
+        ("lattice", lattice(step, info.lattice_exact)),
     ];
     html! {
         div.two {
@@ -232,23 +206,15 @@ fn classes(classes: &[(u8, u64)]) -> Markup {
 }
 
 fn needs(info: &Info) -> Markup {
-    let spread = |p: &Percentiles| {
-        html! { "median " (length(p.p50)) ", 5 to 95 %: " (length(p.p5)) " to " (length(p.p95)) }
-    };
+    let about = |size: u64| shown(format!("about {}", bytes(size)));
+    let Percentiles { p5, p50, p95 } = info.auto_radius;
+    let least = format!("any budget from {}", bytes(info.memory_minimum));
+    let time = format!("about {} on this machine", seconds(info.seconds));
     list(&[
-        (
-            "memory",
-            Some(html! { "any budget from " (bytes(info.memory_minimum)) }),
-        ),
-        (
-            "scratch",
-            Some(html! { "about " (bytes(info.scratch_bytes)) }),
-        ),
-        ("mesh", Some(html! { "about " (bytes(info.output_bytes)) })),
-        (
-            "time",
-            Some(html! { "about " (seconds(info.seconds)) " on this machine" }),
-        ),
-        ("automatic radius", Some(spread(&info.auto_radius))),
+        ("memory", shown(least)),
+        ("scratch", about(info.scratch_bytes)),
+        ("mesh", about(info.output_bytes)),
+        ("time", shown(time)),
+        ("automatic radius", shown(spread(p5, p50, p95))),
     ])
 }

@@ -1,7 +1,7 @@
 //! The page of a comparison.
 
 use super::charts::lengths;
-use super::sheet::{Sheet, card, list, table, view};
+use super::sheet::{card, list, sheet, shown, table, view};
 use super::words::{count, file_name, length, path};
 use maud::{Markup, html};
 use outcrop_inspect::compare::{Comparison, Distances, Illustration, Kind, Side};
@@ -41,13 +41,7 @@ pub fn comparison(comparison: &Comparison, illustration: &Illustration) -> Strin
         }
     };
     let line = html! { "A is " (file_name(&a.path)) ", B is " (file_name(&b.path)) };
-    let sheet = Sheet {
-        kind: "Comparison",
-        title: &title,
-        line,
-        body,
-    };
-    sheet.html()
+    sheet("Comparison", &title, &line, &body)
 }
 
 fn cards(comparison: &Comparison) -> Markup {
@@ -117,24 +111,15 @@ fn distances(comparison: &Comparison) -> Markup {
 fn side(side: &Side) -> Markup {
     let mesh = side.kind == Kind::Mesh;
     list(&[
-        ("file", Some(html! { (path(&side.path)) })),
-        (
-            "kind",
-            Some(html! { @if mesh { "mesh" } @else { "cloud" } }),
-        ),
+        ("file", shown(path(&side.path))),
+        ("kind", shown(if mesh { "mesh" } else { "cloud" })),
         (
             if mesh { "vertices" } else { "distinct points" },
             Some(count(side.points)),
         ),
         ("triangles", mesh.then(|| count(side.triangles))),
         ("area", mesh.then(|| html! { (length(side.area)) })),
-        (
-            "lowest corner",
-            Some(html! { (side.min.map(length).join("  ")) }),
-        ),
-        (
-            "highest corner",
-            Some(html! { (side.max.map(length).join("  ")) }),
-        ),
+        ("lowest corner", shown(side.min.map(length).join("  "))),
+        ("highest corner", shown(side.max.map(length).join("  "))),
     ])
 }

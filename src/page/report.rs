@@ -2,9 +2,9 @@
 
 use super::advice;
 use super::charts::{Line, course, lengths, sizes};
-use super::sheet::{Sheet, advice as words_of, card, key, list, table, view};
+use super::sheet::{advice as words_of, card, key, lattice, list, sheet, shown, table, view};
 use super::words::{
-    bytes, clean, count, counted, file_name, length, path, percent, position, seconds,
+    bytes, clean, count, counted, file_name, length, path, percent, position, seconds, spread,
 };
 use crate::report::{Details, IngestStats, Picture, Report, Sample};
 use maud::{Markup, html};
@@ -40,13 +40,7 @@ pub fn report(report: &Report, mesh: &Path) -> String {
         "Surface reconstruction of " (counted(report.input.files.len() as u64, "file"))
         " by outcrop " (report.version)
     };
-    let sheet = Sheet {
-        kind: "Reconstruction report",
-        title: &title,
-        line,
-        body,
-    };
-    sheet.html()
+    sheet("Reconstruction report", &title, &line, &body)
 }
 
 fn cards(report: &Report) -> Markup {
@@ -123,6 +117,7 @@ pub(super) fn files(input: &IngestStats) -> Markup {
 fn input(report: &Report) -> Markup {
     let input = &report.input;
     let some = |n: u64| (n > 0).then(|| count(n));
+    let corner = |p| shown(position(p, report.lattice.step));
     let extent = bounds(&report.input);
     let size = extent.map(|[low, high]| [0, 1, 2].map(|k| length(high[k] - low[k])).join(" × "));
     let all: u64 = input.files.iter().map(|file| file.bytes).sum();
@@ -130,7 +125,7 @@ fn input(report: &Report) -> Markup {
     let rows = [
         ("points read", Some(count(input.read))),
         ("points kept", Some(count(input.kept))),
-        ("size of the files", Some(html! { (bytes(all)) })),
+        ("size of the files", shown(bytes(all))),
         ("no numbers", some(input.dropped_non_finite)),
         ("withheld", some(input.withheld)),
         ("no return", some(input.invalid)),
@@ -152,27 +147,18 @@ fn input(report: &Report) -> Markup {
         ),
         (
             "lowest corner",
-            extent.map(|[low, _]| html! { (position(low, report.lattice.step)) }),
+            extent.and_then(|[low, _]| corner(low)),
         ),
         (
             "highest corner",
-            extent.map(|[_, high]| html! { (position(high, report.lattice.step)) }),
+            extent.and_then(|[_, high]| corner(high)),
         ),
-        ("extent", size.map(|size| html! { (size) })),
+        ("extent", size.and_then(shown)),
         (
             "local spacing",
-            spacing.map(|s| {
-                html! {
-                    "median " (length(s.p50)) ", 5 to 95 %: " (length(s.p5)) " to " (length(s.p95))
-                }
-            }),
+            spacing.and_then(|s| shown(spread(s.p5, s.p50, s.p95))),
         ),
-        (
-            "lattice",
-            Some(html! {
-                "steps of " (length(report.lattice.step)) @if report.lattice.exact { ", exact" } @else { ", rounded" }
-            }),
-        ),
+        ("lattice", lattice(report.lattice.step, report.lattice.exact)),
         ("scanners", some(report.scanners.len() as u64)),
         (
             "normals",
@@ -194,10 +180,11 @@ fn input(report: &Report) -> Markup {
 
 fn output(report: &Report, mesh: &Path) -> Markup {
     let (stats, repair) = (&report.mesh, &report.repair);
+    let (origin, step) = (report.origin, report.lattice.step);
     let some = |n: u64| (n > 0).then(|| count(n));
     let loops = report.details.as_ref().and_then(|d| d.loops.as_ref());
     let rows = [
-        ("file", Some(html! { (path(mesh)) })),
+        ("file", shown(path(mesh))),
         ("vertices", Some(count(stats.vertices))),
         ("triangles", Some(count(stats.triangles))),
         ("boundary edges", Some(count(stats.boundary_edges))),
@@ -219,13 +206,11 @@ fn output(report: &Report, mesh: &Path) -> Markup {
         ),
         (
             "coordinates",
-            Some(html! { (format!("{:?}", report.coordinates).to_lowercase()) }),
+            shown(format!("{:?}", report.coordinates).to_lowercase()),
         ),
         (
             "origin",
-            report
-                .origin
-                .map(|origin| html! { (position(origin, report.lattice.step)) }),
+            origin.map(|origin| position(origin, step)).and_then(shown),
         ),
     ];
     let steps = [
@@ -342,25 +327,14 @@ fn over_time(report: &Report, details: &Details) -> Markup {
 
 fn memory(report: &Report) -> Markup {
     let rows = [
-        ("budget", Some(html! { (bytes(report.memory_budget)) })),
-        (
-            "peak resident",
-            Some(html! { (bytes(report.peak_resident_bytes)) }),
-        ),
-        ("peak held", Some(html! { (bytes(report.peak_held_bytes)) })),
-        (
-            "peak reserved",
-            Some(html! { (bytes(report.peak_reserved_bytes)) }),
-        ),
-        (
-            "peak of scratch files",
-            Some(html! { (bytes(report.peak_scratch_bytes)) }),
-        ),
-        (
-            "estimated scratch",
-            Some(html! { (bytes(report.estimated_scratch_bytes)) }),
-        ),
+        ("budget", report.memory_budget),
+        ("peak resident", report.peak_resident_bytes),
+        ("peak held", report.peak_held_bytes),
+        ("peak reserved", report.peak_reserved_bytes),
+        ("peak of scratch files", report.peak_scratch_bytes),
+        ("estimated scratch", report.estimated_scratch_bytes),
     ];
+    let rows = rows.map(|(name, size)| (name, shown(bytes(size))));
     let held = report.held_at_peak.iter();
     let held = held.map(|(name, size)| vec![html! { (name) }, html! { (bytes(*size)) }]);
     html! {

@@ -3,53 +3,40 @@
 use super::words::{clean, length};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
 use outcrop_draw::picture::Picture;
 
 const STYLE: &str = include_str!("style.css");
 
-/// A whole page.
-pub struct Sheet<'a> {
-    /// Kind of page, such as "Reconstruction".
-    pub kind: &'a str,
-    /// Its title.
-    pub title: &'a str,
-    /// A line below the title.
-    pub line: Markup,
-    /// The content.
-    pub body: Markup,
-}
-
-impl Sheet<'_> {
-    /// The page as HTML. It needs nothing from anywhere else, and has no script.
-    pub fn html(self) -> String {
-        let page = html! {
-            (DOCTYPE)
-            html lang="en" {
-                head {
-                    meta charset="utf-8";
-                    meta name="viewport" content="width=device-width, initial-scale=1";
-                    meta name="color-scheme" content="light dark";
-                    meta name="generator" content=(concat!("outcrop ", env!("CARGO_PKG_VERSION")));
-                    title { (self.title) " · " (self.kind) }
-                    link rel="icon" href="data:,";
-                    style { (PreEscaped(STYLE)) }
-                }
-                body {
-                    main {
-                        header {
-                            div.kind { (self.kind) }
-                            h1 { (self.title) }
-                            p { (self.line) }
-                        }
-                        (self.body)
-                        footer { "Made by outcrop " (env!("CARGO_PKG_VERSION")) ". This page needs no network and has no script." }
+/// A whole page as HTML, which needs nothing from anywhere else, and has no script: its kind, such as
+/// "Reconstruction", its title, a line below the title, and the content.
+pub fn sheet(kind: &str, title: &str, line: &Markup, content: &Markup) -> String {
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta name="color-scheme" content="light dark";
+                meta name="generator" content=(concat!("outcrop ", env!("CARGO_PKG_VERSION")));
+                title { (title) " · " (kind) }
+                link rel="icon" href="data:,";
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                main {
+                    header {
+                        div.kind { (kind) }
+                        h1 { (title) }
+                        p { (line) }
                     }
+                    (content)
+                    footer { "Made by outcrop " (env!("CARGO_PKG_VERSION")) ". This page needs no network and has no script." }
                 }
             }
-        };
-        page.into_string()
-    }
+        }
+    };
+    page.into_string()
 }
 
 /// A figure at the top of a page.
@@ -76,6 +63,17 @@ pub fn list(rows: &[(&str, Option<Markup>)]) -> Markup {
             }
         }
     }
+}
+
+/// The value of a row.
+pub fn shown(value: impl Render) -> Option<Markup> {
+    Some(value.render())
+}
+
+/// The value of the row of the lattice.
+pub fn lattice(step: f64, exact: bool) -> Option<Markup> {
+    let exact = if exact { "exact" } else { "rounded" };
+    shown(format!("steps of {}, {exact}", length(step)))
 }
 
 /// A table whose first column is text and whose other columns are numbers.
@@ -111,6 +109,16 @@ pub struct Advice {
     pub remedy: String,
     /// False for a note, which is no warning.
     pub warning: bool,
+}
+
+impl Advice {
+    pub fn new(warning: bool, words: String, remedy: &str) -> Self {
+        Self {
+            words,
+            remedy: remedy.to_owned(),
+            warning,
+        }
+    }
 }
 
 /// Warnings and notes.

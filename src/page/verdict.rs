@@ -1,6 +1,6 @@
 //! The page of a check.
 
-use super::sheet::{Advice, Sheet, advice, card, key, list, table, view};
+use super::sheet::{Advice, advice, card, key, list, sheet, shown, table, view};
 use super::words::{clean, count, file_name, path, position};
 use maud::{Markup, html};
 use outcrop_inspect::verify::{Illustration, Place, Verdict};
@@ -44,13 +44,7 @@ pub fn verdict(mesh: &Path, verdict: &Verdict, illustration: &Illustration) -> S
         @if !illustration.places.is_empty() { (places(&illustration.places)) }
     };
     let line = html! { "Is it a manifold? " @if verdict.manifold { "Yes." } @else { "No." } };
-    let sheet = Sheet {
-        kind: "Check of a mesh",
-        title: &title,
-        line,
-        body,
-    };
-    sheet.html()
+    sheet("Check of a mesh", &title, &line, &body)
 }
 
 fn cards(verdict: &Verdict) -> Markup {
@@ -114,52 +108,41 @@ fn words(verdict: &Verdict) -> Vec<Advice> {
             "The file is damaged.",
         ),
     ];
-    let found = all.into_iter().filter(|(count, ..)| *count > 0);
-    let mut words: Vec<Advice> = found
-        .map(|(count, what, remedy)| Advice {
-            words: format!("{count} {what}"),
-            remedy: remedy.to_owned(),
-            warning: true,
+    let rest = [
+        (
+            !verdict.unreferenced_allowed,
+            verdict.unreferenced_vertices,
+            "vertices have no triangle.",
+            "--allow-unreferenced accepts them.",
+        ),
+        (
+            false,
+            verdict.zero_area_triangles,
+            "triangles have no area. It is not a defect.",
+            "",
+        ),
+    ];
+    let all = all.map(|(count, what, remedy)| (true, count, what, remedy));
+    let found = all.into_iter().chain(rest).filter(|one| one.1 > 0);
+    found
+        .map(|(warning, count, what, remedy)| {
+            Advice::new(warning, format!("{count} {what}"), remedy)
         })
-        .collect();
-    if verdict.unreferenced_vertices > 0 {
-        words.push(Advice {
-            words: format!(
-                "{} vertices have no triangle.",
-                verdict.unreferenced_vertices
-            ),
-            remedy: "--allow-unreferenced accepts them.".to_owned(),
-            warning: !verdict.unreferenced_allowed,
-        });
-    }
-    if verdict.zero_area_triangles > 0 {
-        words.push(Advice {
-            words: format!(
-                "{} triangles have no area. It is not a defect.",
-                verdict.zero_area_triangles
-            ),
-            remedy: String::new(),
-            warning: false,
-        });
-    }
-    words
+        .collect()
 }
 
 fn counts(mesh: &Path, verdict: &Verdict) -> Markup {
     let corner = |p: [f64; 3]| html! { (position(p, 1e-6)) };
     list(&[
-        ("file", Some(html! { (path(mesh)) })),
+        ("file", shown(path(mesh))),
         ("vertices", Some(count(verdict.vertices))),
         ("triangles", Some(count(verdict.triangles))),
         ("edges", Some(count(verdict.edges))),
         ("boundary edges", Some(count(verdict.boundary_edges))),
         ("boundary loops", Some(count(verdict.boundary_loops))),
         ("components", Some(count(verdict.components))),
-        (
-            "Euler characteristic",
-            Some(html! { (verdict.euler_characteristic) }),
-        ),
-        ("genus", verdict.genus.map(|genus| html! { (genus) })),
+        ("Euler characteristic", shown(verdict.euler_characteristic)),
+        ("genus", verdict.genus.and_then(shown)),
         (
             "triangles without area",
             Some(count(verdict.zero_area_triangles)),

@@ -31,6 +31,12 @@ pub fn length(x: f64) -> String {
     }
 }
 
+/// The middle of some lengths, and the range of most.
+pub fn spread(p5: f64, p50: f64, p95: f64) -> String {
+    let [p5, p50, p95] = [p5, p50, p95].map(length);
+    format!("median {p50}, 5 to 95 %: {p5} to {p95}")
+}
+
 /// A position, to a tenth of a step of the lattice on which it lies.
 pub fn position(p: [f64; 3], step: f64) -> String {
     let decimals = match step {
