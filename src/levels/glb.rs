@@ -3,6 +3,7 @@
 use super::columns::Columns;
 use super::lattice::Lattice;
 use super::node::Node;
+use outcrop_codecs::glb::{COMPRESSION, FLOAT, INDEX, SHORT, View, header};
 use outcrop_codecs::light;
 use outcrop_codecs::meshopt;
 use outcrop_disk::error::{Error, Result};
@@ -16,15 +17,10 @@ fn component(scalar: Scalar) -> u32 {
         Scalar::I8 => 5120,
         Scalar::U8 => 5121,
         Scalar::I16 => 5122,
-        Scalar::U16 => 5123,
-        _ => 5126,
+        Scalar::U16 => SHORT,
+        _ => FLOAT,
     }
 }
-
-const UNSIGNED_SHORT: u32 = 5123;
-const UNSIGNED_INT: u32 = 5125;
-
-const EXTENSION: &str = "EXT_meshopt_compression";
 
 /// The grids of a tileset.
 #[derive(Debug, Clone)]
@@ -70,32 +66,18 @@ fn encoded(data: std::io::Result<Vec<u8>>) -> Result<Vec<u8>> {
 
 impl Writer {
     /// Adds a buffer view of compressed data; returns its number.
-    fn view(
-        &mut self,
-        (compressed, mode, filter): (Vec<u8>, &str, Option<&str>),
-        (count, stride): (usize, usize),
-        target: u32,
-    ) -> usize {
-        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
+    fn view(&mut self, compressed: &[u8], view: &View<'_>) -> usize {
+        self.align();
         self.decoded = self.decoded.next_multiple_of(4);
-        let mut extension = json!({
-            "buffer": 0, "byteOffset": self.bytes.len(), "byteLength": compressed.len(),
-            "byteStride": stride, "count": count, "mode": mode,
-        });
-        if let Some(filter) = filter {
-            extension["filter"] = filter.into();
-        }
-        let mut view = json!({
-            "buffer": 1, "byteOffset": self.decoded, "byteLength": count * stride,
-            "target": target, "extensions": { EXTENSION: extension },
-        });
-        if mode == "ATTRIBUTES" {
-            view["byteStride"] = stride.into();
-        }
-        self.decoded += count * stride;
-        self.bytes.extend_from_slice(&compressed);
-        self.views.push(view);
+        let element = view.json(self.bytes.len() as u64, self.decoded as u64);
+        self.views.push(element);
+        self.decoded += view.plain();
+        self.bytes.extend_from_slice(compressed);
         self.views.len() - 1
+    }
+
+    fn align(&mut self) {
+        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
     }
 
     /// Adds vertex data of `stride` bytes each; returns the number of the accessor.
@@ -104,12 +86,17 @@ impl Writer {
         data: &[u8],
         stride: usize,
         filter: Option<&str>,
-        accessor: Value,
+        mut accessor: Value,
     ) -> Result<usize> {
         let count = data.len() / stride;
         let packed = encoded(meshopt::vertices(data, stride))?;
-        let view = self.view((packed, "ATTRIBUTES", filter), (count, stride), 34962);
-        let mut accessor = accessor;
+        let view = View {
+            stride,
+            count,
+            mode: ("ATTRIBUTES", filter),
+            bytes: packed.len(),
+        };
+        let view = self.view(&packed, &view);
         accessor["bufferView"] = view.into();
         accessor["count"] = count.into();
         self.accessors.push(accessor);
@@ -125,10 +112,16 @@ impl Writer {
     ) -> Result<usize> {
         let packed = encoded(packed)?;
         let (stride, component) = match vertices < 1 << 16 {
-            true => (2, UNSIGNED_SHORT),
-            false => (4, UNSIGNED_INT),
+            true => (2, SHORT),
+            false => (4, INDEX),
         };
-        let view = self.view((packed, mode, None), (count, stride), 34963);
+        let view = View {
+            stride,
+            count,
+            mode: (mode, None),
+            bytes: packed.len(),
+        };
+        let view = self.view(&packed, &view);
         self.accessors.push(json!({
             "bufferView": view, "componentType": component, "count": count, "type": "SCALAR",
         }));
@@ -178,33 +171,19 @@ pub(super) fn write(
     let step = grids.lattice.step;
     let [x, y, z] = place.map(|x| f64::from(x) * step);
     let matrix = [
-        step,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        -step,
-        0.0,
-        0.0,
-        step,
-        0.0,
-        0.0,
-        x,
-        z,
-        0.0 - y,
-        1.0,
+        [step, 0.0, 0.0, 0.0],
+        [0.0, 0.0, -step, 0.0],
+        [0.0, step, 0.0, 0.0],
+        [x, z, 0.0 - y, 1.0],
     ];
-    writer
-        .bytes
-        .resize(writer.bytes.len().next_multiple_of(4), 0);
+    writer.align();
     let json = json!({
         "asset": { "version": "2.0", "generator": concat!("outcrop ", env!("CARGO_PKG_VERSION")) },
-        "extensionsUsed": [EXTENSION, "KHR_mesh_quantization"],
-        "extensionsRequired": [EXTENSION, "KHR_mesh_quantization"],
+        "extensionsUsed": [COMPRESSION, "KHR_mesh_quantization"],
+        "extensionsRequired": [COMPRESSION, "KHR_mesh_quantization"],
         "scene": 0,
         "scenes": [{ "nodes": [0] }],
-        "nodes": [{ "mesh": 0, "matrix": matrix }],
+        "nodes": [{ "mesh": 0, "matrix": matrix.as_flattened() }],
         "meshes": [{ "primitives": primitives }],
         "materials": [{
             "doubleSided": true,
@@ -212,28 +191,14 @@ pub(super) fn write(
         }],
         "buffers": [
             { "byteLength": writer.bytes.len() },
-            { "byteLength": writer.decoded.max(1), "extensions": { EXTENSION: { "fallback": true } } },
+            { "byteLength": writer.decoded.max(1), "extensions": { COMPRESSION: { "fallback": true } } },
         ],
         "bufferViews": writer.views,
         "accessors": writer.accessors,
     });
-    Ok(container(&json, &writer.bytes))
-}
-
-fn container(json: &Value, binary: &[u8]) -> Vec<u8> {
-    let mut json = json.to_string().into_bytes();
-    json.resize(json.len().next_multiple_of(4), b' ');
-    let length = (12 + 8 + json.len() + 8 + binary.len()) as u32;
-    let mut all = Vec::with_capacity(length as usize);
-    all.extend_from_slice(b"glTF");
-    all.extend_from_slice(&2u32.to_le_bytes());
-    all.extend_from_slice(&length.to_le_bytes());
-    for (kind, chunk) in [(b"JSON", &*json), (b"BIN\0", binary)] {
-        all.extend_from_slice(&(chunk.len() as u32).to_le_bytes());
-        all.extend_from_slice(kind);
-        all.extend_from_slice(chunk);
-    }
-    all
+    let mut file = header(json.to_string().into_bytes(), writer.bytes.len() as u64);
+    file.extend_from_slice(&writer.bytes);
+    Ok(file)
 }
 
 /// Positions as whole steps from the place, in the filter `EXPONENTIAL`, and the bits that this leaves out.
@@ -264,11 +229,11 @@ fn positions(
         }
         low.extend_from_slice(&[0, 0]);
     }
-    let accessor = json!({ "componentType": 5126, "type": "VEC3", "min": min, "max": max });
+    let accessor = json!({ "componentType": FLOAT, "type": "VEC3", "min": min, "max": max });
     let position = writer.attribute(&data, 12, Some("EXPONENTIAL"), accessor)?;
     let mut attributes = json!({ "POSITION": position });
     if any {
-        let accessor = json!({ "componentType": UNSIGNED_SHORT, "type": "VEC3" });
+        let accessor = json!({ "componentType": SHORT, "type": "VEC3" });
         attributes["_LOW"] = writer.attribute(&low, 8, None, accessor)?.into();
     }
     Ok(attributes)
@@ -293,8 +258,7 @@ fn values(
             }
             data.extend_from_slice(&[0, 0]);
         }
-        let accessor =
-            json!({ "componentType": UNSIGNED_SHORT, "normalized": true, "type": "VEC3" });
+        let accessor = json!({ "componentType": SHORT, "normalized": true, "type": "VEC3" });
         attributes["COLOR_0"] = writer.attribute(&data, 8, None, accessor)?.into();
         number = 1;
     }

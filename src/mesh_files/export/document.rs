@@ -3,10 +3,8 @@
 use super::format::{MADE_BY, Mesh};
 use super::glb::{self, Y_UP};
 use super::piece::{About, VIEWS};
+use outcrop_codecs::glb::{COMPRESSION, FLOAT, INDEX, SHORT, View, header};
 use serde_json::{Value, json};
-
-/// The name of the extension.
-const EXTENSION: &str = "EXT_meshopt_compression";
 
 /// Bytes before the JSON: the head of the file and that of the chunk.
 pub const HEADS: u64 = 12 + 8;
@@ -64,16 +62,6 @@ fn push(list: &mut Vec<u8>, element: &Value) {
     list.extend_from_slice(element.to_string().as_bytes());
 }
 
-/// A part of the buffer: bytes of an element, their number, the mode of compression and the filter, its use.
-struct View {
-    stride: u64,
-    count: u64,
-    mode: (&'static str, Option<&'static str>),
-    target: u32,
-    /// Compressed bytes.
-    bytes: u32,
-}
-
 impl Document<'_> {
     /// Bytes of the longest JSON for `count` pieces, a multiple of four.
     pub fn most(&self, count: usize) -> u64 {
@@ -95,7 +83,7 @@ impl Document<'_> {
         let mut text = self.text(&lists, next);
         drop(lists);
         text.resize(room as usize, b' ');
-        glb::header(&text, end, end - HEADS - room - 8)
+        header(text, end - HEADS - room - 8)
     }
 
     fn text(&self, lists: &Lists, next: Next) -> Vec<u8> {
@@ -106,8 +94,8 @@ impl Document<'_> {
         let scale = [self.step; 3];
         let rest = json!({
             "asset": asset,
-            "extensionsUsed": [EXTENSION],
-            "extensionsRequired": [EXTENSION],
+            "extensionsUsed": [COMPRESSION],
+            "extensionsRequired": [COMPRESSION],
             "scene": 0,
             "scenes": [{ "nodes": [0] }],
             "nodes": [
@@ -117,7 +105,7 @@ impl Document<'_> {
             "materials": [glb::material()],
             "buffers": [
                 { "byteLength": next.packed },
-                { "byteLength": next.plain, "extensions": { EXTENSION: { "fallback": true } } },
+                { "byteLength": next.plain, "extensions": { COMPRESSION: { "fallback": true } } },
             ],
         });
         let mut text = rest.to_string().into_bytes();
@@ -137,47 +125,39 @@ impl Document<'_> {
 
     /// Adds a piece to the lists.
     fn add(&self, lists: &mut Lists, about: &About, next: &mut Next) {
-        let vertices = u64::from(about.vertices);
         let of_vertices = |stride, filter, bytes| View {
             stride,
-            count: vertices,
+            count: about.vertices as usize,
             mode: ("ATTRIBUTES", filter),
-            target: glb::FOR_VERTICES,
-            bytes,
+            bytes: bytes as usize,
         };
         let [low, high] = about.bounds;
         let mut attributes = json!({ "POSITION": next.accessors });
         let filter = about.filtered.then_some("EXPONENTIAL");
         let view = of_vertices(12, filter, about.bytes[0]);
-        let accessor =
-            json!({ "componentType": glb::FLOAT, "type": "VEC3", "min": low, "max": high });
+        let accessor = json!({ "componentType": FLOAT, "type": "VEC3", "min": low, "max": high });
         next.add(lists, view, accessor);
         if self.mesh.normals().is_some() {
             attributes["NORMAL"] = next.accessors.into();
             let view = of_vertices(12, Some("EXPONENTIAL"), about.bytes[1]);
-            let accessor = json!({ "componentType": glb::FLOAT, "type": "VEC3" });
+            let accessor = json!({ "componentType": FLOAT, "type": "VEC3" });
             next.add(lists, view, accessor);
         }
         if self.mesh.colours().is_some() {
             attributes["COLOR_0"] = next.accessors.into();
-            let view = of_vertices(glb::COLOUR as u64, None, about.bytes[2]);
-            let accessor =
-                json!({ "componentType": glb::SHORT, "type": "VEC4", "normalized": true });
+            let view = of_vertices(glb::COLOUR, None, about.bytes[2]);
+            let accessor = json!({ "componentType": SHORT, "type": "VEC4", "normalized": true });
             next.add(lists, view, accessor);
         }
         let indices = next.accessors;
         let view = View {
             stride: 4,
-            count: 3 * u64::from(about.triangles),
+            count: 3 * about.triangles as usize,
             mode: ("TRIANGLES", None),
-            target: glb::FOR_INDICES,
-            bytes: about.bytes[3],
+            bytes: about.bytes[3] as usize,
         };
-        next.add(
-            lists,
-            view,
-            json!({ "componentType": glb::INDEX, "type": "SCALAR" }),
-        );
+        let accessor = json!({ "componentType": INDEX, "type": "SCALAR" });
+        next.add(lists, view, accessor);
         let primitive = json!({
             "attributes": attributes, "indices": indices, "material": 0, "mode": 4,
         });
@@ -187,31 +167,15 @@ impl Document<'_> {
 
 impl Next {
     /// Adds a view, and an accessor of all of it.
-    fn add(&mut self, lists: &mut Lists, view: View, mut accessor: Value) {
+    fn add(&mut self, lists: &mut Lists, view: View<'_>, mut accessor: Value) {
         accessor["bufferView"] = self.views.into();
         accessor["count"] = view.count.into();
         push(&mut lists.accessors, &accessor);
-        let (mode, filter) = view.mode;
-        let plain = view.stride * view.count;
-        let mut packed = json!({
-            "buffer": 0, "byteOffset": self.packed, "byteLength": view.bytes, "byteStride": view.stride,
-            "count": view.count, "mode": mode,
-        });
-        if let Some(filter) = filter {
-            packed["filter"] = filter.into();
-        }
-        let mut element = json!({
-            "buffer": 1, "byteOffset": self.plain, "byteLength": plain, "target": view.target,
-            "extensions": { EXTENSION: packed },
-        });
-        if view.target == glb::FOR_VERTICES {
-            element["byteStride"] = view.stride.into();
-        }
-        push(&mut lists.views, &element);
+        push(&mut lists.views, &view.json(self.packed, self.plain));
         self.accessors += 1;
         self.views += 1;
-        self.packed += u64::from(view.bytes).next_multiple_of(4);
-        self.plain += plain;
+        self.packed += view.bytes.next_multiple_of(4) as u64;
+        self.plain += view.plain() as u64;
     }
 }
 

@@ -8,6 +8,7 @@
 use super::format::{
     CoordinateType, Exceeded, Layout, MADE_BY, Mesh, MeshFormat, Positions, VertexColumn, four, two,
 };
+use outcrop_codecs::glb::{FLOAT, FOR_INDICES, FOR_VERTICES, INDEX, SHORT, header};
 use outcrop_codecs::light;
 use outcrop_disk::workspace::fault;
 use outcrop_ply::Scalar;
@@ -18,15 +19,6 @@ pub struct Glb;
 
 /// Bytes of a triangle: three indices.
 const TRIANGLE: u64 = 12;
-
-/// Numbers of the types of components in glTF.
-pub const SHORT: u32 = 5123;
-pub const INDEX: u32 = 5125;
-pub const FLOAT: u32 = 5126;
-
-/// Numbers of the uses of parts of the buffer in glTF.
-pub const FOR_VERTICES: u32 = 34962;
-pub const FOR_INDICES: u32 = 34963;
 
 /// The matrix of a node that turns z up into y up, by columns.
 pub const Y_UP: [i32; 16] = [1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1];
@@ -73,15 +65,9 @@ impl MeshFormat for Glb {
     fn layout(&self, mesh: &Mesh) -> Layout {
         let record = Record::of(mesh);
         let binary = mesh.vertices * record.bytes as u64 + mesh.triangles * TRIANGLE;
-        let mut json = document(mesh, &record).to_string().into_bytes();
-        json.resize(json.len().next_multiple_of(4), b' ');
-        let all = 12 + 8 + json.len() as u64 + 8 + binary;
-        Layout::of(
-            header(&json, all, binary),
-            mesh,
-            record.bytes as u64,
-            TRIANGLE,
-        )
+        let json = document(mesh, &record).to_string().into_bytes();
+        let header = header(json, binary);
+        Layout::of(header, mesh, record.bytes as u64, TRIANGLE)
     }
 
     fn put_vertices(
@@ -138,21 +124,6 @@ pub fn put_colour(values: &[u8], (places, scalar): ([usize; 3], Scalar), bytes: 
         bytes.extend_from_slice(&light.to_le_bytes());
     }
     bytes.extend_from_slice(&u16::MAX.to_le_bytes());
-}
-
-/// All before the binary content: `json` is padded already, the file has `all` bytes, of which `binary` follow.
-pub fn header(json: &[u8], all: u64, binary: u64) -> Vec<u8> {
-    let word = |count: u64| u32::try_from(count).unwrap_or(u32::MAX).to_le_bytes();
-    let mut header = Vec::with_capacity(28 + json.len());
-    header.extend_from_slice(b"glTF");
-    header.extend_from_slice(&2u32.to_le_bytes());
-    header.extend_from_slice(&word(all));
-    header.extend_from_slice(&word(json.len() as u64));
-    header.extend_from_slice(b"JSON");
-    header.extend_from_slice(json);
-    header.extend_from_slice(&word(binary));
-    header.extend_from_slice(b"BIN\0");
-    header
 }
 
 /// The material: not metallic, rough, seen from both sides.
