@@ -22,6 +22,7 @@ mod view;
 use clap::Parser;
 use ended::Ended;
 use outcrop_disk::error::Error;
+pub use output::told;
 use std::process::ExitCode;
 
 /// Exit code for a negative answer (`verify`).
@@ -63,7 +64,7 @@ pub fn main() -> ExitCode {
             ExitCode::from(stop::TIME_IS_UP)
         }
         Ok(Ended::Damaged(error)) => {
-            let error = output::told(&error);
+            let error = told(&error);
             eprintln!(
                 "outcrop: {error}; `outcrop advance` finds what is damaged and has it made again"
             );
@@ -77,7 +78,7 @@ pub fn main() -> ExitCode {
                     let other = stop::quoted(&path.with_extension("ply"));
                     hint.push_str(&format!(" --output {other}"));
                 }
-                eprintln!("outcrop: {}{hint}", output::told(&error));
+                eprintln!("outcrop: {}{hint}", told(&error));
             }
             ExitCode::from(match error {
                 Error::Cancelled => stop::code(false),

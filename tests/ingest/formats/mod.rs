@@ -14,7 +14,6 @@ mod zoo;
 
 use crate::bench::Bench;
 use kinds::{KINDS, Kind};
-use outcrop::error::Setting;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use zoo::ZOO;
@@ -64,21 +63,13 @@ fn has(text: &str, pattern: &str) -> bool {
     })
 }
 
-/// An option as the command line spells it.
-fn dashed(setting: &Setting) -> String {
-    match setting {
-        Setting::Option(name) | Setting::Flag(name) => format!("--{}", name.replace('_', "-")),
-        Setting::Value(name, value) => format!("--{} {value}", name.replace('_', "-")),
-    }
-}
-
 /// The difference between the outcome of a file and its row; none if they agree.
 fn check(bench: &Bench, row: &Row, path: &Path) -> Option<String> {
     let outcome = bench.read(&[path.to_path_buf()]);
     let (outcome, said) = match outcome {
         Ok(spool) if spool.stats().warnings.is_empty() => ("read", String::new()),
         Ok(spool) => ("warning", spool.stats().warnings.join("\n")),
-        Err(error) => ("refused", error.told(dashed)),
+        Err(error) => ("refused", outcrop::cli::told(&error)),
     };
     let right = outcome == row.outcome && said.lines().count() <= 1 && has(&said, row.said);
     (!right).then(|| format!("{} ({}): {outcome} {said}", path.display(), row.kind))
