@@ -7,7 +7,7 @@ use crate::params::Params;
 use crate::pipeline::Known;
 #[cfg(feature = "pages")]
 pub use drawing::{Illustration, illustrated};
-use outcrop_disk::error::Result;
+use outcrop_disk::error::{Result, Setting};
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::memory::MINIMUM_BUDGET;
 use outcrop_draw::histogram::Tally;
@@ -15,7 +15,8 @@ use outcrop_geom::aabb::Aabb;
 use outcrop_geom::lattice::Lattice;
 use outcrop_geom::method::METHOD;
 use outcrop_points::{
-    Attributes, CoordinateType, IngestStats, Selection, Spool, depths_shown, ingest_selected,
+    Attributes, CoordinateType, FileStats, IngestStats, Selection, Spool, depths_shown,
+    ingest_selected,
 };
 use outcrop_stages::attributes::attributes;
 use outcrop_stages::blocks::Blocks;
@@ -363,21 +364,37 @@ impl Info {
 
 impl fmt::Display for Info {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for file in &self.input.files {
-            let path = file.path.display();
-            write!(f, "{path}: {}, {} points", file.format, file.points)?;
-            // If it is not that of all.
-            if let (None, Some(crs)) = (&self.input.crs, &file.crs) {
-                write!(f, ", {}", crs.described())?;
-            }
-            writeln!(f)?;
-            if let Some(taken) = &file.taken {
-                writeln!(f, "  {taken}")?;
-            }
-            if let Some(shown) = shown(&file.scanners) {
-                writeln!(f, "  {shown}")?;
-            }
+        f.write_str(&self.told(Setting::to_string))
+    }
+}
+
+impl Info {
+    /// As text, for a front that spells options so.
+    #[must_use]
+    pub fn told(&self, spell: impl Fn(&Setting) -> String) -> String {
+        let rows = self.rows(&spell);
+        let rows = rows.iter().filter(|row| !row.1.is_empty());
+        let rows = rows.map(|(name, text)| format!("{name:<13}{text}\n"));
+        let files = self.input.files.iter().map(|file| self.file(file, &spell));
+        let time = format!("time         about {:.0} s", self.seconds.ceil());
+        files.chain(rows).chain([time]).collect()
+    }
+
+    /// The lines of a file.
+    fn file(&self, file: &FileStats, spell: impl Fn(&Setting) -> String) -> String {
+        let path = file.path.display();
+        let mut lines = format!("{path}: {}, {} points", file.format, file.points);
+        // If it is not that of all.
+        if let (None, Some(crs)) = (&self.input.crs, &file.crs) {
+            lines += &format!(", {}", crs.described(spell));
         }
+        let more = file.taken.clone().into_iter().chain(shown(&file.scanners));
+        lines.extend(more.map(|line| format!("\n  {line}")));
+        lines + "\n"
+    }
+
+    /// What is known of the cloud, by name; what is empty is not shown.
+    fn rows(&self, spell: impl Fn(&Setting) -> String) -> [(&'static str, String); 16] {
         let three = |p: &[f64; 3]| format!("{} {} {}", p[0], p[1], p[2]);
         let spread =
             |p: &Percentiles| format!("{:.4} (5-95 %: {:.4} to {:.4})", p.p50, p.p5, p.p95);
@@ -395,7 +412,7 @@ impl fmt::Display for Info {
             input.dropped_by_crop
         );
         let system = match &input.crs {
-            Some(crs) => crs.described(),
+            Some(crs) => crs.described(spell),
             None if input.files.iter().any(|file| file.crs.is_some()) => "different ones".into(),
             None => "not given".into(),
         };
@@ -405,7 +422,7 @@ impl fmt::Display for Info {
             "rounded"
         };
         let normals = self.normals.as_ref();
-        let rows = [
+        [
             (
                 "points",
                 format!("{} distinct of {} read", self.points, input.read),
@@ -434,10 +451,6 @@ impl fmt::Display for Info {
             ),
             ("scratch", format!("about {}", mib(self.scratch_bytes))),
             ("mesh", format!("about {}", mib(self.output_bytes))),
-        ];
-        for (name, text) in rows.into_iter().filter(|row| !row.1.is_empty()) {
-            writeln!(f, "{name:<13}{text}")?;
-        }
-        write!(f, "time         about {:.0} s", self.seconds.ceil())
+        ]
     }
 }

@@ -4,7 +4,8 @@ mod facing;
 mod smooth;
 
 pub use facing::Facing;
-use outcrop_disk::error::{Error, Result};
+use outcrop_disk::error::{Error, Result, Setting};
+use outcrop_disk::workspace::progress::Observer;
 use outcrop_geom::method::METHOD;
 pub use outcrop_geom::region::{NoRegion, Region};
 use outcrop_points::{
@@ -317,7 +318,11 @@ impl Params {
     }
 
     /// A warning if the default margin around the region is narrow for the density of the points read.
-    pub(crate) fn narrow_margin(&self, input: &IngestStats) -> Option<String> {
+    pub(crate) fn narrow_margin(
+        &self,
+        input: &IngestStats,
+        observer: &dyn Observer,
+    ) -> Option<String> {
         let margin = self.selection().crop?.margin;
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for file in &input.files {
@@ -335,9 +340,9 @@ impl Params {
         narrow.then(|| {
             format!(
                 "the margin around the region is {margin}, {:.0} times the mean spacing of the points: at the cut \
-                 the mesh may differ from that of the whole cloud; --crop-margin {:.3} is wide enough",
+                 the mesh may differ from that of the whole cloud; {} is wide enough",
                 margin / spacing,
-                SPACINGS * spacing
+                observer.spell(&Setting::Value("crop_margin", format!("{:.3}", SPACINGS * spacing)))
             )
         })
     }

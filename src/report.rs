@@ -30,6 +30,13 @@ use std::collections::BTreeMap;
 pub enum TilesReport {}
 
 #[cfg(not(feature = "levels"))]
+impl TilesReport {
+    pub(crate) fn told(&self, _: impl Fn(&outcrop_disk::error::Setting) -> String) -> String {
+        match *self {}
+    }
+}
+
+#[cfg(not(feature = "levels"))]
 impl std::fmt::Display for TilesReport {
     fn fmt(&self, _: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match *self {}

@@ -65,7 +65,7 @@ impl Job {
                 call::Answer::Mesh { output, .. } => Some(output.clone()),
                 _ => None,
             };
-            Ok(Outcome::Answer((answer.json()?, answer.text(), output)))
+            Ok(Outcome::Answer((answer.json()?, answer.told(keyword), output)))
         })
     }
 
@@ -199,7 +199,7 @@ fn draw(mesh: &Path, shared: &Shared) -> Result<Vec<u8>> {
 }
 
 /// An option as a keyword.
-fn keyword(setting: &Setting) -> String {
+pub fn keyword(setting: &Setting) -> String {
     match setting {
         Setting::Option(name) => (*name).to_owned(),
         Setting::Flag(name) => format!("{name}=True"),

@@ -1,5 +1,7 @@
 //! The progress of a run: the latest state of its stages, kept until Python reads it.
 
+use crate::job::keyword;
+use outcrop::error::Setting;
 use outcrop::{Observer, Outlook, Planned};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -90,5 +92,9 @@ impl Observer for Progress {
 
     fn warn(&self, message: &str) {
         self.state().warnings.push(message.to_owned());
+    }
+
+    fn spell(&self, setting: &Setting) -> String {
+        keyword(setting)
     }
 }

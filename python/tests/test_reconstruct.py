@@ -216,7 +216,7 @@ def test_bars_of_tqdm(points: Points, capfd: pytest.CaptureFixture[str]) -> None
 
 def test_warnings_are_python_warnings(points: Points, tmp_path: Path) -> None:
     far = points + [635_000, 848_000, 0]
-    with pytest.warns(outcrop.OutcropWarning, match="rounded|precision"):
+    with pytest.warns(outcrop.OutcropWarning, match='or give origin="auto"'):
         outcrop.reconstruct(far, output=tmp_path / "mesh.stl", memory=MEMORY)
 
 

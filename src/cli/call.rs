@@ -2,7 +2,7 @@
 //! is caught, and the program does not end.
 //!
 //! Options have the names, meanings, defaults and messages that they have on the command line, since the same
-//! code reads them. [`crate::Reconstruction`] and its like have the same abilities with types of their own.
+//! code reads them; warnings name options as the observer spells them. [`crate::Reconstruction`] and its like have the same abilities with types of their own.
 //!
 //! ```
 //! use outcrop::call::{self, Answer};
@@ -27,7 +27,7 @@ use crate::info::Info;
 use crate::report::{Report, TilesReport};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{ArgAction, CommandFactory, Parser};
-use outcrop_disk::error::{Error, Result};
+use outcrop_disk::error::{Error, Result, Setting};
 use outcrop_disk::workspace::progress::{Cancel, Observer};
 use outcrop_inspect::compare::Comparison;
 use outcrop_inspect::verify::Verdict;
@@ -74,12 +74,18 @@ impl Answer {
     /// As text, as the command prints it on a terminal.
     #[must_use]
     pub fn text(&self) -> String {
+        self.told(output::spelled)
+    }
+
+    /// The same, for a front that spells options so.
+    #[must_use]
+    pub fn told(&self, spell: impl Fn(&Setting) -> String) -> String {
         match self {
             Self::Mesh { report, output } => output::summary(report, output),
-            Self::Info(info) => info.to_string(),
+            Self::Info(info) => info.told(spell),
             Self::Verdict(verdict) => verdict.to_string(),
             Self::Comparison(comparison) => comparison.to_string(),
-            Self::Tiles(report) => report.to_string(),
+            Self::Tiles(report) => report.told(spell),
         }
     }
 }

@@ -6,7 +6,7 @@ use super::command::Command;
 use super::demo;
 use super::ended::Ended;
 use super::jobs;
-use super::output::{print, show, summary};
+use super::output::{print, show, show_told, spelled, summary};
 #[cfg(feature = "view")]
 use super::view;
 use super::{manual, shared, stop};
@@ -64,7 +64,7 @@ fn tell((report, output): jobs::Made, quiet: Quiet) -> Result<bool> {
 
 fn info(args: &Info) -> Result<bool> {
     let info = jobs::info(args, stop::watched(args.limits.quiet))?;
-    show(&info, args.json)?;
+    show_told(&info, args.json, |info| info.told(spelled))?;
     Ok(true)
 }
 
@@ -82,7 +82,7 @@ fn measure(args: &Compare) -> Result<bool> {
 
 fn tiles(args: &Tiles) -> Result<bool> {
     let report = jobs::tiles(args, stop::watched(args.limits.quiet))?;
-    show(&report, args.json)?;
+    show_told(&report, args.json, |report| report.told(spelled))?;
     Ok(true)
 }
 

@@ -92,7 +92,7 @@ fn run(
     let run = builder.pictures(page).build()?;
     if let Some(path) = ends.report.iter().find(|path| **path == run.output()) {
         return Err(Error::Parameter {
-            name: "--report",
+            name: "report",
             found: path.display().to_string(),
             expected: "a file other than the mesh".into(),
         });

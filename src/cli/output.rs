@@ -12,10 +12,15 @@ use std::path::Path;
 
 /// An error with what helps, options as on the command line.
 pub fn told(error: &Error) -> String {
-    error.told(|setting| match setting {
+    error.told(spelled)
+}
+
+/// An option as on the command line.
+pub fn spelled(setting: &Setting) -> String {
+    match setting {
         Setting::Option(name) | Setting::Flag(name) => dashed(name),
         Setting::Value(name, value) => format!("{} {value}", dashed(name)),
-    })
+    }
 }
 
 /// The option of this name; a name of something else as it is.
@@ -39,11 +44,16 @@ pub fn json<T: Serialize>(value: &T) -> Result<String> {
 
 /// Prints a value as JSON or as text.
 pub fn show<T: Serialize + Display>(value: &T, as_json: bool) -> Result<()> {
-    print(&if as_json {
-        json(value)?
-    } else {
-        value.to_string()
-    })
+    show_told(value, as_json, T::to_string)
+}
+
+/// Prints a value as JSON or as this text.
+pub fn show_told<T: Serialize>(
+    value: &T,
+    as_json: bool,
+    text: impl Fn(&T) -> String,
+) -> Result<()> {
+    print(&if as_json { json(value)? } else { text(value) })
 }
 
 /// True if a report with this name is a page.
@@ -86,7 +96,7 @@ impl<'a> NewFile<'a> {
         PAGES.require()?;
         if !is_page(path) {
             return Err(Error::Parameter {
-                name: "--html",
+                name: "html",
                 found: path.display().to_string(),
                 expected: "a name that ends in .html".into(),
             });

@@ -1,8 +1,10 @@
 //! Progress on a terminal: stage, rate, time left, memory, one line for each stage; and one for the whole run.
 
+use super::output::spelled;
 use indicatif::{
     HumanCount, HumanDuration, MultiProgress, ProgressBar, ProgressState, ProgressStyle,
 };
+use outcrop_disk::error::Setting;
 use outcrop_disk::workspace::outlook::{Outlook, Planned, Position};
 use outcrop_disk::workspace::progress::Observer;
 use outcrop_disk::workspace::{limits, lock};
@@ -153,6 +155,10 @@ impl Observer for Bars {
     fn warn(&self, message: &str) {
         self.lines.suspend(|| Warnings.warn(message));
     }
+
+    fn spell(&self, setting: &Setting) -> String {
+        spelled(setting)
+    }
 }
 
 /// Prints warnings only.
@@ -162,11 +168,35 @@ impl Observer for Warnings {
     fn warn(&self, message: &str) {
         eprintln!("outcrop: warning: {message}");
     }
+
+    fn spell(&self, setting: &Setting) -> String {
+        spelled(setting)
+    }
+}
+
+/// Prints nothing; the report has the warnings.
+pub struct Nothing;
+
+impl Observer for Nothing {
+    fn spell(&self, setting: &Setting) -> String {
+        spelled(setting)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn warnings_have_options_as_on_the_command_line() {
+        let observers: [&dyn Observer; 3] = [&Bars::default(), &Warnings, &Nothing];
+        for observer in observers {
+            let said = |setting| observer.spell(&setting);
+            assert_eq!(said(Setting::Flag("keep_far")), "--keep-far");
+            let value = Setting::Value("crop_margin", "1.250".into());
+            assert_eq!(said(value), "--crop-margin 1.250");
+        }
+    }
 
     #[test]
     fn the_line_of_the_whole_run_says_how_much_and_how_long() {

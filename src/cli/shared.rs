@@ -251,7 +251,7 @@ pub fn work(args: &Work) -> Result<Ended> {
         let planned = pipeline::planned_shards(&folder)?;
         if planned != count {
             return Err(Error::Parameter {
-                name: "--shard",
+                name: "shard",
                 found: format!("a shard of {count}"),
                 expected: format!("one of the {planned} that were planned"),
             });

@@ -2,10 +2,10 @@
 //! stopping.
 
 use super::args::Quiet;
-use super::progress::{Bars, Warnings};
+use super::progress::{Bars, Nothing, Warnings};
 use crate::pipeline::Reconstruction;
 use crossbeam_channel::{Receiver, after, never, select, tick, unbounded};
-use outcrop_disk::workspace::progress::{Cancel, Observer, Silent};
+use outcrop_disk::workspace::progress::{Cancel, Observer};
 use outcrop_disk::workspace::{Folder, fault, lock};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
@@ -42,7 +42,7 @@ pub fn code(expired: bool) -> u8 {
 /// The receiver of the progress, and the flag that signals raise.
 pub fn watched(quiet: Quiet) -> (Arc<dyn Observer>, Cancel) {
     if !quiet.warns() {
-        (Arc::new(Silent), watch(None))
+        (Arc::new(Nothing), watch(None))
     } else if quiet.tells() && std::io::stderr().is_terminal() {
         let bars = Arc::new(Bars::default());
         (bars.clone(), watch(Some(bars)))

@@ -1,5 +1,6 @@
 //! The error type of the library. A variant has what was found and what was expected. What helps is data
-//! ([`Error::remedies`]): the command line and Python name options each in their own way.
+//! ([`Error::remedies`]): the command line and Python name options each in their own way, in warnings too
+//! ([`crate::workspace::progress::Observer::spell`]).
 
 mod remedy;
 

@@ -1,6 +1,7 @@
 //! Options of a tileset, and the report on it.
 
 use super::cells::MOST;
+use outcrop_disk::error::Setting;
 use outcrop_points::{Crs, GivenCrs};
 use serde::{Deserialize, Serialize};
 
@@ -60,21 +61,25 @@ pub struct TilesReport {
 
 impl std::fmt::Display for TilesReport {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.told(Setting::to_string))
+    }
+}
+
+impl TilesReport {
+    /// As text, for a front that spells options so.
+    #[must_use]
+    pub fn told(&self, spell: impl Fn(&Setting) -> String) -> String {
         let megabytes = |bytes: u64| bytes as f64 / 1e6;
-        writeln!(
-            f,
-            "{} triangles in {} tiles of {} levels, {:.1} MB",
+        let system = self.crs.as_ref().map(|crs| crs.described(spell));
+        let system = system.map_or_else(String::new, |system| format!("system: {system}\n"));
+        format!(
+            "{} triangles in {} tiles of {} levels, {:.1} MB\n\
+             {system}\
+             coarsest tile: {} triangles, {:.2} MB, at most {:.6} from the mesh",
             self.triangles,
             self.tiles,
             self.levels,
-            megabytes(self.bytes)
-        )?;
-        if let Some(crs) = &self.crs {
-            writeln!(f, "system: {}", crs.described())?;
-        }
-        write!(
-            f,
-            "coarsest tile: {} triangles, {:.2} MB, at most {:.6} from the mesh",
+            megabytes(self.bytes),
             self.root_triangles,
             megabytes(self.root_bytes),
             self.root_error

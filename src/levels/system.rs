@@ -2,7 +2,7 @@
 
 use super::Options;
 use outcrop_codecs::ply_mesh;
-use outcrop_disk::error::Result;
+use outcrop_disk::error::{Result, Setting};
 use outcrop_disk::workspace::Workspace;
 use outcrop_points::Crs;
 use std::path::Path;
@@ -18,7 +18,8 @@ pub(super) fn of(path: &Path, options: &Options, workspace: &Workspace) -> Resul
         let given = given.crs();
         if let Some(header) = header.filter(|header| header.horizontal != given.horizontal) {
             warn(format!(
-                "--crs: {given} is taken instead of {header}, which the header of {} gives",
+                "{}: {given} is taken instead of {header}, which the header of {} gives",
+                workspace.observer.spell(&Setting::Option("crs")),
                 path.display()
             ));
         }

@@ -168,7 +168,7 @@ fn points(info: &Info) -> Markup {
         (
             "reference system",
             Some(html! {
-                @match &input.crs { Some(crs) => (clean(&crs.described())), None => "not given" }
+                @match &input.crs { Some(crs) => (clean(&crs.described(|option| format!("--{option}")))), None => "not given" }
             }),
         ),
         ("lowest corner", shown(position(info.min, step))),

@@ -9,6 +9,7 @@
 //! Unneeded files are not counted. They are deleted as soon as the deletion is synced
 //! (`workspace/keeper.rs`), within a moment.
 
+use super::Reconstruction;
 use crate::params::{Method, Params, Smooth};
 use crate::report::DiskEstimate;
 use outcrop_disk::error::{Error, Result};
@@ -171,21 +172,20 @@ impl Known {
         Ok(likely.err())
     }
 
-    /// Warnings about what the format of `output` leaves out, of points with these columns, in coordinates from
+    /// Warnings about what the format of the mesh leaves out, of points with these columns, in coordinates from
     /// `origin`.
     pub fn left_out(
         &self,
-        params: &Params,
+        job: &Reconstruction,
         columns: &[Column],
         (coordinates, origin): (CoordinateType, [f64; 3]),
-        output: &Path,
     ) -> Result<Vec<String>> {
         let bounds = self.text.map(|text| text.bounds).unwrap_or_default();
         let away = |corner: [f64; 3]| (0..3).map(move |k| (corner[k] - origin[k]).abs());
         let largest = bounds.into_iter().flat_map(away).fold(0.0, f64::max);
-        let mut mesh = self.mesh(params, coordinates);
+        let mut mesh = self.mesh(&job.params, coordinates);
         mesh.columns.extend(columns.iter().map(Into::into));
-        export::left_out(output, &mesh, largest)
+        export::left_out(&job.mesh, &mesh, largest, &*job.observer)
     }
 
     /// The mesh that is expected.

@@ -16,7 +16,7 @@ use super::{Clock, Known, Reconstruction};
 use crate::params::Method;
 use crate::report::{LatticeReport, Report};
 use export::written;
-use outcrop_disk::error::Result;
+use outcrop_disk::error::{Result, Setting};
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::course::Course;
 use outcrop_geom::lattice::Lattice;
@@ -193,7 +193,7 @@ impl<'a> Stages<'a> {
         };
         workspace.note_points(input.kept);
         self.plan(input.kept, Some("ingest"), !self.carried.is_empty());
-        let narrow = params.narrow_margin(&input);
+        let narrow = params.narrow_margin(&input, &*job.observer);
         self.report.input = input;
         self.warn_of_input();
         narrow.into_iter().for_each(|warning| self.warn(warning));
@@ -256,9 +256,7 @@ impl<'a> Stages<'a> {
         columns.extend(displaced.then(Column::displacement));
         let (shift, coordinates) = self.shift(store.bounds(), lattice)?;
         let place = (coordinates, shift.map_or([0.0; 3], |shift| shift.origin));
-        let warnings = self
-            .known
-            .left_out(&job.params, &columns, place, &job.mesh)?;
+        let warnings = self.known.left_out(job, &columns, place)?;
         for warning in warnings {
             self.warn(warning);
         }
@@ -289,8 +287,9 @@ impl<'a> Stages<'a> {
         }
         let far = (self.report.input.dropped_far, self.report.input.far_example);
         if let (count, Some([x, y, z])) = far {
+            let option = self.job.observer.spell(&Setting::Flag("keep_far"));
             self.warn(format!(
-                "{count} points left out, far from all others (one at {x} {y} {z}): with --keep-far they \
+                "{count} points left out, far from all others (one at {x} {y} {z}): with {option} they \
                  are kept, and all are rounded to coarser steps"
             ));
         }

@@ -6,15 +6,23 @@ use super::given::GivenCrs;
 use super::stats::IngestStats;
 use super::systems::Systems;
 use super::units;
+use outcrop_disk::error::Setting;
+use outcrop_disk::workspace::progress::Observer;
 
 impl IngestStats {
     /// Compares the files with each other; returns the well-known text of the system of all, which is `given` if
     /// that is.
-    pub(super) fn compare(&mut self, systems: Systems, given: Option<&GivenCrs>) -> Option<String> {
+    pub(super) fn compare(
+        &mut self,
+        systems: Systems,
+        given: Option<&GivenCrs>,
+        observer: &dyn Observer,
+    ) -> Option<String> {
         let (found, warning) = match (systems.common(), given) {
             (common, Some(given)) => {
                 let given = given.crs();
-                let warning = belong::replaced(&self.files, &common, &given);
+                let option = observer.spell(&Setting::Option("crs"));
+                let warning = belong::replaced(&self.files, &common, &given, &option);
                 (Some(given), warning)
             }
             (Ok(crs), None) => {
@@ -27,7 +35,7 @@ impl IngestStats {
         };
         let units = found
             .as_ref()
-            .and_then(|crs| units::warning(&self.files, crs));
+            .and_then(|crs| units::warning(&self.files, crs, observer));
         let places = belong::warnings(&self.files);
         let warnings = warning.into_iter().chain(units).chain(places);
         self.warnings.extend(warnings);

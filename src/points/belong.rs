@@ -34,17 +34,19 @@ pub(super) fn without(files: &[FileStats], crs: &Crs) -> Option<String> {
     ))
 }
 
-/// A warning if files give another system than that which is given for them, or if nothing is known of that.
+/// A warning if files give another system than that which is given for them by `option`, or if nothing is known of
+/// that.
 pub(super) fn replaced(
     files: &[FileStats],
     common: &Result<Option<Crs>, Mixed>,
     given: &Crs,
+    option: &str,
 ) -> Option<String> {
     let said = match common {
         Err(mixed) => {
             let [(first, system), (other, another)] = mixed.both();
             format!(
-                "--crs: {given} is taken for all files, though {} gives {system} and {} gives {another}",
+                "{option}: {given} is taken for all files, though {} gives {system} and {} gives {another}",
                 first.display(),
                 other.display()
             )
@@ -52,10 +54,10 @@ pub(super) fn replaced(
         Ok(Some(found)) if found.differs(given) || found.horizontal != given.horizontal => {
             let gives = |file: &&FileStats| file.crs.is_some();
             let first = files.iter().find(gives)?.path.display();
-            format!("--crs: {given} is taken instead of {found}, which {first} gives")
+            format!("{option}: {given} is taken instead of {found}, which {first} gives")
         }
         _ if given.kind.is_none() => format!(
-            "--crs: {given} is none of the systems that are known here, so its units are not, and tiles in it \
+            "{option}: {given} is none of the systems that are known here, so its units are not, and tiles in it \
              cannot be placed on the globe"
         ),
         _ => return None,

@@ -1,6 +1,7 @@
 //! Reference systems: what files say of them, as far as needed to name and to compare them.
 
 use super::kind::CrsKind;
+use outcrop_disk::error::Setting;
 use serde::{Deserialize, Serialize};
 
 /// Most bytes of a well-known text.
@@ -21,19 +22,27 @@ pub enum CrsSource {
     GeotiffKeys,
     /// Comments in the header of a PLY file.
     Comments,
-    /// The option `--crs`.
+    /// The option `crs`.
     Given,
 }
 
 impl std::fmt::Display for CrsSource {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
+        f.write_str(&self.told(Setting::to_string))
+    }
+}
+
+impl CrsSource {
+    /// In words, for a front that spells options so.
+    fn told(self, spell: impl Fn(&Setting) -> String) -> String {
+        let source = match self {
             Self::WellKnownText => "well-known text",
             Self::Prj => ".prj file",
             Self::GeotiffKeys => "GeoTIFF keys",
             Self::Comments => "comments of the header",
-            Self::Given => "--crs",
-        })
+            Self::Given => return spell(&Setting::Option("crs")),
+        };
+        source.to_owned()
     }
 }
 
@@ -148,12 +157,12 @@ impl Crs {
         self.codes().unwrap_or_else(|| self.line())
     }
 
-    /// The same, with the units and where it was found.
-    #[must_use]
-    pub fn described(&self) -> String {
+    /// The same, with the units and where it was found, for a front that spells options so.
+    pub fn described(&self, spell: impl Fn(&Setting) -> String) -> String {
+        let (line, source) = (self.line(), self.source.told(spell));
         match self.units() {
-            units if units.is_empty() => format!("{} ({})", self.line(), self.source),
-            units => format!("{} ({}), {units}", self.line(), self.source),
+            units if units.is_empty() => format!("{line} ({source})"),
+            units => format!("{line} ({source}), {units}"),
         }
     }
 

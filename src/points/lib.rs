@@ -301,7 +301,7 @@ fn read_all(
     if let Some(crop) = crop.filter(|_| stats.kept == 0) {
         crop.check_met(&sources)?;
     }
-    let wkt = stats.compare(systems, selection.crs.as_ref());
+    let wkt = stats.compare(systems, selection.crs.as_ref(), &*workspace.observer);
     Ok(Spool {
         name: name.to_owned(),
         frames,

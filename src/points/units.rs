@@ -3,6 +3,8 @@
 use super::crs::Crs;
 use super::kind::{CrsKind, height_of_code, name, of_code, same};
 use super::stats::FileStats;
+use outcrop_disk::error::Setting;
+use outcrop_disk::workspace::progress::Observer;
 
 impl Crs {
     /// The same, with the kind and the units that follow from the codes where the record does not tell them.
@@ -86,7 +88,7 @@ fn metric_system([low, high]: [[f64; 3]; 2]) -> u32 {
 }
 
 /// A warning if a mesh in this system makes no sense: its axes have different units, or up is not z.
-pub(super) fn warning(files: &[FileStats], crs: &Crs) -> Option<String> {
+pub(super) fn warning(files: &[FileStats], crs: &Crs, observer: &dyn Observer) -> Option<String> {
     let path = files.first()?.path.display().to_string();
     let corners = bounds(files)?;
     let how = |code: String| {
@@ -95,6 +97,7 @@ pub(super) fn warning(files: &[FileStats], crs: &Crs) -> Option<String> {
              --filters.reprojection.out_srs=EPSG:{code}`"
         )
     };
+    let option = |name| observer.spell(&Setting::Option(name));
     match crs.kind? {
         CrsKind::Geographic => {
             let reach = corners
@@ -111,13 +114,15 @@ pub(super) fn warning(files: &[FileStats], crs: &Crs) -> Option<String> {
                 ),
                 false => format!(
                     "{path}: its reference system {crs} is in degrees, but coordinates reach {reach}: it is \
-                     wrong, and --crs gives the right one"
+                     wrong, and {} gives the right one",
+                    option("crs")
                 ),
             })
         }
         CrsKind::Geocentric => Some(format!(
             "{path}: its reference system {crs} is geocentric, so z is not up, and which side is out may be \
-             wrong without --facing: {}",
+             wrong without {}: {}",
+            option("facing"),
             how("CODE".into())
         )),
         CrsKind::Projected | CrsKind::Local => None,

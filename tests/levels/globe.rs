@@ -167,7 +167,7 @@ fn the_header_of_a_mesh_is_enough_and_goes_before_a_file() {
     given.is_at(at, on_equator(9.0, 100.0), 1e-3);
     assert!(
         given.said[0]
-            .starts_with("--crs: EPSG:32632 is taken instead of EPSG:32631, which the header of ")
+            .starts_with("crs: EPSG:32632 is taken instead of EPSG:32631, which the header of ")
     );
     // Without a header, the file is enough.
     mesh(&path, at, 8.0, &[]);

@@ -2,7 +2,7 @@
 
 use super::Error;
 
-/// An option of a run. Names are those of Python: lower case, with `_` between words.
+/// An option of a run, in an error or a warning. Names are those of Python: lower case, with `_` between words.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Setting {
     /// An option of which the user knows the value.
@@ -11,6 +11,16 @@ pub enum Setting {
     Flag(&'static str),
     /// An option with this value.
     Value(&'static str, String),
+}
+
+/// By name; each front has its own way to write it.
+impl std::fmt::Display for Setting {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Option(name) | Self::Flag(name) => f.write_str(name),
+            Self::Value(name, value) => write!(f, "{name} {value}"),
+        }
+    }
 }
 
 /// What helps against an error.

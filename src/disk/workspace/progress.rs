@@ -1,7 +1,7 @@
 //! Progress reports of a run, and the flag that stops it.
 
 use super::outlook::Planned;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Setting};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
@@ -26,6 +26,10 @@ pub trait Observer: Send + Sync {
     /// A warning for the user, one line.
     fn warn(&self, message: &str) {
         let _ = message;
+    }
+    /// An option as the user writes it, for the words of warnings, also of those in the report.
+    fn spell(&self, setting: &Setting) -> String {
+        setting.to_string()
     }
 }
 

@@ -3,7 +3,8 @@
 use super::file::is_compressed;
 use super::format::{CoordinateType, Mesh, MeshFormat};
 use super::{glb, obj, ply, stl};
-use outcrop_disk::error::{Error, Result};
+use outcrop_disk::error::{Error, Result, Setting};
+use outcrop_disk::workspace::progress::Observer;
 use std::path::Path;
 
 /// All formats.
@@ -86,7 +87,12 @@ pub fn check_size(output: &Path, mesh: &Mesh, estimated: bool) -> Result<()> {
 }
 
 /// Warnings about what the format of `output` leaves out of a mesh whose coordinates are up to `largest`.
-pub fn left_out(output: &Path, mesh: &Mesh, largest: f64) -> Result<Vec<String>> {
+pub fn left_out(
+    output: &Path,
+    mesh: &Mesh,
+    largest: f64,
+    observer: &dyn Observer,
+) -> Result<Vec<String>> {
     let format = format_of(output)?;
     let mut warnings = Vec::new();
     let lost = mesh.columns.iter().filter(|c| !format.holds(mesh, c));
@@ -101,9 +107,10 @@ pub fn left_out(output: &Path, mesh: &Mesh, largest: f64) -> Result<Vec<String>>
         let largest = (largest as f32).min(f32::MAX / 2.0);
         warnings.push(format!(
             "{} has 32-bit floats only: coordinates of this cloud are rounded to steps of up to {}; \
-             .ply, .obj and .glb keep them, or give --origin auto",
+             .ply, .obj and .glb keep them, or give {}",
             format.name(),
             largest.next_up() - largest,
+            observer.spell(&Setting::Value("origin", "auto".to_owned())),
         ));
     }
     Ok(warnings)

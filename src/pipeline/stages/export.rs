@@ -4,7 +4,7 @@ use super::super::origin::Steps;
 use super::super::{beside, levels};
 use super::Stages;
 use crate::params::Origin;
-use outcrop_disk::error::Result;
+use outcrop_disk::error::{Result, Setting};
 use outcrop_geom::aabb::Aabb;
 use outcrop_geom::lattice::{Lattice, Shift};
 use outcrop_mesh_files::cut::StoredPieces;
@@ -34,8 +34,9 @@ impl Stages<'_> {
         let coarse = self.coarse;
         let [x, y, z] = Steps { lattice, coarse }.given(to)?.origin;
         if [x, y, z] != to {
+            let option = self.job.observer.spell(&Setting::Option("origin"));
             self.warn(format!(
-                "--origin: {x},{y},{z} is used, the nearest position on the lattice of steps of {coarse}"
+                "{option}: {x},{y},{z} is used, the nearest position on the lattice of steps of {coarse}"
             ));
         }
         Ok(())

@@ -249,7 +249,7 @@ impl PointFile for Cloud {
             (..) => binary::read::<f64>(input, self, vertex, target),
         }?;
         Ok(match vertex.splats {
-            true => vec![splat::NOTE.into()],
+            true => vec![splat::note(&*target.workspace.observer)],
             false => Vec::new(),
         })
     }

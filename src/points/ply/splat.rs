@@ -1,6 +1,8 @@
 //! Gaussian splats in PLY: points with colours in the first coefficients of spherical harmonics.
 
 use super::super::columns::COLORS;
+use outcrop_disk::error::Setting;
+use outcrop_disk::workspace::progress::Observer;
 use outcrop_ply::{Element, Property, Scalar};
 
 /// The coefficients of the colours that do not depend on the direction.
@@ -13,8 +15,13 @@ const OTHERS: [&str; 3] = ["opacity", "scale_0", "rot_0"];
 const HARMONIC: f64 = 0.282_094_791_773_878_14;
 
 /// What is said of such a file.
-pub(super) const NOTE: &str = "Gaussian splats: their centres are points, also those of transparent ones, with colours \
-    of f_dc; --drop-outliers leaves out floaters, and an editor of splats those of low opacity";
+pub(super) fn note(observer: &dyn Observer) -> String {
+    format!(
+        "Gaussian splats: their centres are points, also those of transparent ones, with colours of f_dc; {} leaves \
+         out floaters, and an editor of splats those of low opacity",
+        observer.spell(&Setting::Flag("drop_outliers"))
+    )
+}
 
 /// True if the vertices are splats without colours of their own.
 pub(super) fn is_splats(element: &Element) -> bool {
