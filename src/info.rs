@@ -148,7 +148,7 @@ fn described(
     let double = spool.source_precision() == CoordinateType::F64;
     let spool_bytes = spool.bytes();
     observer.begin("order", "points", input.kept);
-    let (stored, duplicates) = order(&spool, &lattice, PAGE, workspace)?;
+    let (stored, duplicates, spool) = order(spool, &lattice, PAGE, workspace)?;
     observer.end();
     let store = stored.open(workspace)?;
     let read = start.elapsed().as_secs_f64();
@@ -157,7 +157,8 @@ fn described(
     if let Some(sketch) = sketch {
         sketch.draw(&store, &lattice, &sample.tally, workspace)?;
     }
-    let normals = normals(&spool, &lattice, (&stored, &store), workspace)?;
+    let normals = spool.map(|spool| normals(spool, &lattice, (&stored, &store), workspace));
+    let normals = normals.transpose()?.flatten();
     stored.release(workspace)?;
     let points = store.len() as u64;
     let cells = sample.seconds / sample.points.max(1) as f64 * points as f64;
@@ -196,13 +197,13 @@ fn described(
 
 /// What is known about the normals of the points, if they were read and a file has any.
 fn normals(
-    spool: &Spool,
+    spool: Spool,
     lattice: &Lattice,
     (stored, store): (&StoredPoints, &PointStore),
     workspace: &Workspace,
 ) -> Result<Option<NormalStats>> {
     let Some(names) = spool.normal_names() else {
-        return Ok(None);
+        return spool.release(workspace).map(|()| None);
     };
     let observer = &workspace.observer;
     observer.begin("attributes", "points", spool.points());

@@ -140,10 +140,10 @@ impl Reconstruction {
     fn reconstruct(&self, workspace: &Workspace) -> Result<Report> {
         let mut stages = Stages::begin(self, workspace)?;
         let (spool, lattice) = stages.ingest()?;
-        let points = stages.order(&spool, &lattice)?;
+        let (points, spool) = stages.order(spool, &lattice)?;
         let divided = stages.without_outliers(points)?;
         let (blocks, tiles) = (divided.blocks, divided.tiles);
-        let mut values = stages.values(&spool, &lattice, &divided)?;
+        let mut values = stages.values(spool, &lattice, &divided)?;
         let radius = stages.radius(&divided.points, &lattice);
         let (points, relaxed) = stages.moved(divided, &mut values)?;
         let store = points.open(workspace)?;

@@ -73,10 +73,11 @@ fn read(path: &Path, workspace: &Workspace) -> Result<u64, String> {
     match ingest(&[PathBuf::from(path)], workspace) {
         Ok(spool) => {
             check_stream(&spool, workspace);
-            spool.release(workspace).unwrap();
             assert_eq!(workspace.memory.available(), workspace.memory.capacity());
             let stats = spool.stats();
-            Ok(stats.read - stats.dropped_non_finite - stats.invalid)
+            let points = stats.read - stats.dropped_non_finite - stats.invalid;
+            spool.release(workspace).unwrap();
+            Ok(points)
         }
         Err(error) => {
             let text = error.to_string();

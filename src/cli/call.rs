@@ -2,7 +2,8 @@
 //! is caught, and the program does not end.
 //!
 //! Options have the names, meanings, defaults and messages that they have on the command line, since the same
-//! code reads them; warnings name options as the observer spells them. [`crate::Reconstruction`] and its like have the same abilities with types of their own.
+//! code reads them; warnings name options as the observer spells them. [`crate::Reconstruction`] and its like have
+//! the same abilities with types of their own.
 //!
 //! ```
 //! use outcrop::call::{self, Answer};

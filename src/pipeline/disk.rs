@@ -16,7 +16,7 @@ use outcrop_disk::error::{Error, Result};
 use outcrop_geom::aabb::Aabb;
 use outcrop_geom::lattice::Lattice;
 use outcrop_mesh_files::export::{self, CoordinateType, Mesh};
-use outcrop_points::{Attributes, Column, Probe, Selection, Spool};
+use outcrop_points::{Attributes, Column, Probe, Selection};
 use outcrop_stages::order::StoredPoints;
 use std::path::{Path, PathBuf};
 
@@ -105,21 +105,15 @@ pub(crate) struct Text {
 }
 
 impl Text {
-    /// The coordinates of ordered points. Without smoothing the vertices are points of the cloud, and need no
+    /// The coordinates of ordered points of a cloud whose lattice is `own`. Without smoothing the vertices are points of the cloud, and need no
     /// finer lattice than they have.
-    pub fn of(
-        spool: &Spool,
-        lattice: &Lattice,
-        params: &Params,
-        points: &StoredPoints,
-    ) -> Result<Self> {
-        let own = spool.choose_lattice(0)?;
+    pub fn of(own: &Lattice, lattice: &Lattice, params: &Params, points: &StoredPoints) -> Self {
         let finer = params.smooth != Smooth::Rounds(0) || !own.exact;
         let Aabb { min, max } = points.bounds();
-        Ok(Self {
-            decimals: export::decimals(if finer { lattice } else { &own }),
+        Self {
+            decimals: export::decimals(if finer { lattice } else { own }),
             bounds: [min, max].map(|corner| lattice.position(corner)),
-        })
+        }
     }
 }
 

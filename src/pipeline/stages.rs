@@ -210,13 +210,19 @@ impl<'a> Stages<'a> {
         Ok((spool, lattice))
     }
 
-    /// Sorts the points along the curve, thinned if requested; duplicates become one point.
-    pub fn order(&mut self, spool: &Spool, lattice: &Lattice) -> Result<StoredPoints> {
+    /// Sorts the points along the curve, thinned if requested; duplicates become one point. The spool comes back if
+    /// values are still to be read.
+    pub fn order(
+        &mut self,
+        spool: Spool,
+        lattice: &Lattice,
+    ) -> Result<(StoredPoints, Option<Spool>)> {
         let (job, workspace) = (self.job, self.workspace);
         let (points, page) = (spool.points(), job.page_points);
         let grid = job.params.thin.and_then(|side| Grid::new(lattice, side));
-        let store = if let Some(grid) = grid {
-            let thinned = self.clock.stage("thin", "points", points, || {
+        let own = spool.choose_lattice(0)?;
+        let (store, spool) = if let Some(grid) = grid {
+            let (thinned, spool) = self.clock.stage("thin", "points", points, || {
                 thin(spool, lattice, grid, workspace)
             })?;
             let (store, left_out) = self.clock.stage("order", "points", 0, || {
@@ -231,22 +237,21 @@ impl<'a> Stages<'a> {
             thinned.release(workspace)?;
             self.report.duplicates_folded = left_out.duplicates;
             self.report.thin = left_out.thin;
-            store
+            (store, spool)
         } else {
-            let (store, folded) =
+            let (store, folded, spool) =
                 self.clock
                     .stage("order", "points", points, || match workspace.is_shared() {
                         true => sample_sort(spool, lattice, page, workspace),
                         false => order(spool, lattice, page, workspace),
                     })?;
             self.report.duplicates_folded = folded;
-            store
+            (store, spool)
         };
-        let text = Text::of(spool, lattice, &job.params, &store)?;
-        self.warn_of_duplicates(spool, lattice)?;
-        if self.carried.is_empty() {
-            spool.release(workspace)?;
-        }
+        let text = Text::of(&own, lattice, &job.params, &store);
+        self.warn_of_duplicates(spool.as_ref(), lattice)?;
+        let again = !self.carried.is_empty();
+        let spool = spool.map_or(Ok(None), |spool| spool.kept_if(again, workspace))?;
         enough(&store)?;
         self.warn_of_left_out();
         self.known.points = store.len() as u64;
@@ -256,8 +261,7 @@ impl<'a> Stages<'a> {
         columns.extend(displaced.then(Column::displacement));
         let (shift, coordinates) = self.shift(store.bounds(), lattice)?;
         let place = (coordinates, shift.map_or([0.0; 3], |shift| shift.origin));
-        let warnings = self.known.left_out(job, &columns, place)?;
-        for warning in warnings {
+        for warning in self.known.left_out(job, &columns, place)? {
             self.warn(warning);
         }
         workspace.note_points(self.known.points);
@@ -265,7 +269,7 @@ impl<'a> Stages<'a> {
             self.plan(self.known.points, Some("order"), !self.carried.is_empty());
         }
         self.check_room()?;
-        Ok(store)
+        Ok((store, spool))
     }
 
     /// Warnings about the points that were read, before anything that may fail because of them.
@@ -296,13 +300,13 @@ impl<'a> Stages<'a> {
     }
 
     /// A warning about many points at the positions of others, if positions are rounded.
-    fn warn_of_duplicates(&mut self, spool: &Spool, lattice: &Lattice) -> Result<()> {
+    fn warn_of_duplicates(&mut self, spool: Option<&Spool>, lattice: &Lattice) -> Result<()> {
         let (folded, kept) = (self.report.duplicates_folded, self.report.input.kept);
         if lattice.exact || folded <= kept / 100 {
             return Ok(());
         }
         let step = lattice.step;
-        self.warn(match spool.has_duplicates(lattice, self.workspace)? {
+        self.warn(match Spool::has_duplicates(spool, lattice, self.workspace)? {
             Some(true) => {
                 format!("{folded} points are duplicates of others: one at each position is kept")
             }

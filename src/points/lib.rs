@@ -122,7 +122,7 @@ pub struct Selection {
     pub crs: Option<GivenCrs>,
 }
 
-/// All points of the inputs in one scratch file.
+/// All points of the inputs in one scratch file. Its last reader takes the spool itself, and deletes the file.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Spool {
     name: String,
@@ -442,11 +442,22 @@ impl Spool {
     ///
     /// # Errors
     /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Disk`].
-    pub fn release(&self, workspace: &Workspace) -> Result<()> {
+    pub fn release(self, workspace: &Workspace) -> Result<()> {
         if self.has_values() {
             workspace.files.release(&values_of(&self.name))?;
         }
         workspace.files.release(&self.name)
+    }
+
+    /// The spool, if it is read again; or else its scratch files are deleted.
+    ///
+    /// # Errors
+    /// See [`Spool::release`].
+    pub fn kept_if(self, again: bool, workspace: &Workspace) -> Result<Option<Self>> {
+        match again {
+            true => Ok(Some(self)),
+            false => self.release(workspace).map(|()| None),
+        }
     }
 
     /// Approximate bytes of the points in the spool.

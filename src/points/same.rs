@@ -33,19 +33,27 @@ struct Counts {
 }
 
 impl Spool {
-    /// True if most points at the position of another one have its coordinates, too; none if the points of the
-    /// spool are deleted. Reads the spool once.
+    /// True if most points at the position of another one have its coordinates, too; none if there is no spool any
+    /// more. Reads the spool once.
     ///
     /// # Errors
     /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`], [`outcrop_disk::error::Error::Cancelled`].
-    pub fn has_duplicates(&self, lattice: &Lattice, workspace: &Workspace) -> Result<Option<bool>> {
+    pub fn has_duplicates(
+        spool: Option<&Self>,
+        lattice: &Lattice,
+        workspace: &Workspace,
+    ) -> Result<Option<bool>> {
         let counts = workspace.once("points at one position", |_| {
-            let file = workspace.files.open(&self.name, true)?;
+            let Some(spool) = spool else {
+                return Ok(None);
+            };
+            let file = workspace.files.open(&spool.name, true)?;
+            // An attempt that was interrupted may have deleted it.
             if file.is_gone() || file.count() == 0 {
                 return Ok(None);
             }
             let mut held = workspace.promise("ingest: points at one position", MEMORY)?;
-            self.count(lattice, workspace, &mut held).map(Some)
+            spool.count(lattice, workspace, &mut held).map(Some)
         })?;
         Ok(counts.map(|counts| {
             let folded = counts.points - counts.positions.min(counts.points);

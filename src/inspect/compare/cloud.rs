@@ -32,7 +32,7 @@ pub(super) fn read(path: &Path, name: &'static str, workspace: &Workspace) -> Re
         other => other,
     })?;
     observer.begin("order", "points", kept);
-    let (stored, _) = order(&spool, &lattice, STORE_PAGE, workspace)?;
+    let (stored, ..) = order(spool, &lattice, STORE_PAGE, workspace)?;
     observer.end();
     let store = stored.open(workspace)?;
 

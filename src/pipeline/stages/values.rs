@@ -86,14 +86,14 @@ impl Stages<'_> {
     /// The values of the points that remain, if any are needed.
     pub fn values(
         &mut self,
-        spool: &Spool,
+        spool: Option<Spool>,
         lattice: &Lattice,
         divided: &Divided,
     ) -> Result<Values> {
         let (store, blocks) = (&divided.points, divided.blocks);
-        if self.carried.is_empty() {
+        let Some(spool) = spool else {
             return Ok(Values::default());
-        }
+        };
         let positions = self.carried.scanners().to_vec();
         let place = |position: &[f64; 3]| scanners::place(*position, lattice, store.bounds());
         let places: Vec<_> = positions.iter().map(place).collect();

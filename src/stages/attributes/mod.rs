@@ -258,7 +258,7 @@ pub struct StoredAttributes {
 /// # Errors
 /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`], [`outcrop_disk::error::Error::Cancelled`].
 pub fn attributes(
-    spool: &Spool,
+    spool: Spool,
     lattice: &Lattice,
     carried: &Carried,
     store: &StoredPoints,
@@ -284,7 +284,7 @@ pub fn attributes(
 
 /// The input of the stage.
 struct Job<'a> {
-    spool: &'a Spool,
+    spool: Spool,
     lattice: &'a Lattice,
     carried: &'a Carried,
     /// Bytes of memory for the rows of a unit.
@@ -293,11 +293,11 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    fn run<R: Row>(&self, store: &StoredPoints, blocks: Blocks) -> Result<StoredAttributes> {
+    fn run<R: Row>(self, store: &StoredPoints, blocks: Blocks) -> Result<StoredAttributes> {
         let workspace = self.workspace;
         let size = self.rows / (COPIES * size_of::<R>() as u64);
         let size = size.max(self.spool.points() / MOST_GROUPS);
-        let source = Grouped::new(self.spool, self.lattice, size, workspace);
+        let source = Grouped::new(&self.spool, self.lattice, size, workspace);
         let cuts = cuts(
             source.samples("attributes: samples")?,
             source.count().max(1),

@@ -43,7 +43,7 @@ fn check<R: Row>(points: u32, side: u32, block: u32, page: usize, keep_all: bool
     let lattice = spool.choose_lattice(0).unwrap();
     let carried = spool.carried(&selection.attributes, false);
     assert_eq!(carried.bytes(), 7);
-    let all = order(&spool, &lattice, page, &workspace).unwrap().0;
+    let (all, _, spool) = order(spool, &lattice, page, &workspace).unwrap();
     let all = all.open(&workspace).unwrap();
     let kept = |p: &Point| keep_all || p.iter().sum::<i32>() % 2 == 0;
     let ids = all.slice(0..all.len()).unwrap();
@@ -53,7 +53,7 @@ fn check<R: Row>(points: u32, side: u32, block: u32, page: usize, keep_all: bool
     let store = writer.finish(&workspace).unwrap();
     let blocks = Blocks::new(store.len(), block);
     let job = Job {
-        spool: &spool,
+        spool: spool.expect("its values are still to be read"),
         lattice: &lattice,
         carried: &carried,
         // A frame is a unit.

@@ -218,16 +218,16 @@ impl Orderer {
 }
 
 /// Sorts all points of a spool, with `page` points in a page. Returns the store and the number of duplicates
-/// removed.
+/// removed. The spool comes back if it may be read again, for values or after an interruption, or is deleted.
 ///
 /// # Errors
 /// [`Error::Io`], [`Error::Corrupt`], [`Error::TooManyPoints`], [`Error::Memory`], [`Error::Cancelled`].
 pub fn order(
-    spool: &Spool,
+    spool: Spool,
     lattice: &Lattice,
     page: usize,
     workspace: &Workspace,
-) -> Result<(StoredPoints, u64)> {
+) -> Result<(StoredPoints, u64, Option<Spool>)> {
     // The read buffers may only take a small part of the memory for sorting.
     let most = workspace.memory.available() / (8 * READ_BUFFERS);
     let threads = workspace.threads.min(most as usize).max(1);
@@ -240,10 +240,9 @@ pub fn order(
     drop(held);
     // After an interruption, points that were only in memory have to be read again; with values all are.
     let again = spool.has_values() || workspace.is_resumable() && !orderer.is_sorted();
-    if !again {
-        spool.release(workspace)?;
-    }
-    orderer.finish(workspace, page)
+    let spool = spool.kept_if(again, workspace)?;
+    let (store, duplicates) = orderer.finish(workspace, page)?;
+    Ok((store, duplicates, spool))
 }
 
 /// The successor of a key.

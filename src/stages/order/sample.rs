@@ -278,18 +278,19 @@ impl Buckets {
     }
 }
 
-/// Sorts all points of a spool as [`super::order`] does, in units for tasks.
+/// Sorts all points of a spool as [`super::order`] does, in units for tasks. The spool always comes back.
 ///
 /// # Errors
 /// [`Error::Io`], [`Error::Corrupt`], [`Error::TooManyPoints`], [`Error::Memory`], [`Error::Cancelled`].
 pub fn sample_sort(
-    spool: &Spool,
+    spool: Spool,
     lattice: &Lattice,
     page: usize,
     workspace: &Workspace,
-) -> Result<(StoredPoints, u64)> {
+) -> Result<(StoredPoints, u64, Option<Spool>)> {
     let size = GROUP.max(spool.points() / MOST_GROUPS);
-    sort_in_groups(spool, lattice, page, size, workspace)
+    let (store, duplicates) = sort_in_groups(&spool, lattice, page, size, workspace)?;
+    Ok((store, duplicates, Some(spool)))
 }
 
 fn sort_in_groups(
@@ -338,7 +339,7 @@ mod tests {
         };
         let found = read(&sampled.0);
         sampled.0.release(&workspace).unwrap();
-        let expected = order(&spool, &lattice, page, &workspace).unwrap();
+        let expected = order(spool, &lattice, page, &workspace).unwrap();
         assert_eq!(sampled.1, expected.1);
         assert!(found == read(&expected.0));
     }

@@ -49,17 +49,18 @@ pub struct Thinned {
 
 release!(Thinned: sorted);
 
-/// Sorts the points of a spool by the cells of `grid`.
+/// Sorts the points of a spool by the cells of `grid`. The spool comes back if its values are still to be read, or is
+/// deleted.
 ///
 /// # Errors
 /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`],
 /// [`outcrop_disk::error::Error::Cancelled`].
 pub fn thin(
-    spool: &Spool,
+    spool: Spool,
     lattice: &Lattice,
     grid: Grid,
     workspace: &Workspace,
-) -> Result<Thinned> {
+) -> Result<(Thinned, Option<Spool>)> {
     let most = workspace.memory.available() / (8 * READ_BUFFERS);
     let threads = workspace.threads.min(most as usize).max(1);
     let frames = workspace.reserve("thin: frames", threads as u64 * READ_BUFFERS)?;
@@ -83,13 +84,10 @@ pub fn thin(
         spool.par_for_frames(workspace, threads, lattice, frames, take)
     })?;
     drop(frames);
-    if !spool.has_values() {
-        spool.release(workspace)?;
-    }
-    Ok(Thinned {
-        sorted: sorter.finish_on_disk(workspace)?,
-        grid,
-    })
+    let again = spool.has_values();
+    let spool = spool.kept_if(again, workspace)?;
+    let sorted = sorter.finish_on_disk(workspace)?;
+    Ok((Thinned { sorted, grid }, spool))
 }
 
 /// The first row of the cell at which to continue; `None` at the beginning.
