@@ -209,7 +209,8 @@ constants! {
     components: Components {
         /// Least number of triangles (paper: 10).
         least: u64 = 10, "triangles";
-        /// A component half of whose triangles are at noisy points needs one triangle for each of this number of points of the cloud.
+        /// A component half of whose triangles are at noisy points needs one triangle for each of this number of
+        /// points of the cloud.
         each_if_noisy: u64 = 5000, "points";
         /// Largest number of triangles that a noisy component needs.
         most_if_noisy: u64 = 150, "triangles";

@@ -105,8 +105,8 @@ pub(crate) struct Text {
 }
 
 impl Text {
-    /// The coordinates of ordered points of a cloud whose lattice is `own`. Without smoothing the vertices are points of the cloud, and need no
-    /// finer lattice than they have.
+    /// The coordinates of ordered points of a cloud whose lattice is `own`. Without smoothing the vertices are
+    /// points of the cloud, and need no finer lattice than they have.
     pub fn of(own: &Lattice, lattice: &Lattice, params: &Params, points: &StoredPoints) -> Self {
         let finer = params.smooth != Smooth::Rounds(0) || !own.exact;
         let Aabb { min, max } = points.bounds();
