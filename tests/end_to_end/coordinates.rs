@@ -101,7 +101,7 @@ fn given_origins_are_rounded_and_said() {
     let report = util::reconstruct(&cloud, &output, &with(Origin::At(at)));
     assert_eq!(report.origin, Some([637_000.0, 5_151_200.0, 0.0]));
     let said =
-        "--origin: 637000,5151200,0 is used, the nearest position on the lattice of steps of 0.001";
+        "origin: 637000,5151200,0 is used, the nearest position on the lattice of steps of 0.001";
     assert_eq!(report.warnings, [said]);
     let (_, text) = header(&output);
     for line in [

@@ -13,7 +13,7 @@ const MESHES: [(&str, u32); 8] = [
     ("clean, paper", 2_771_001_501),
     ("noisy, robust", 3_023_428_338),
     ("noisy, paper", 1_777_962_663),
-    ("noisy, smooth", 194_612_694),
+    ("noisy, smooth", 2_552_388_948),
     ("scan lines, robust", 3_568_111_642),
     ("outdoor, robust", 960_381_736),
     ("outdoor, thinned", 1_325_491_697),
