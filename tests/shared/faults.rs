@@ -235,7 +235,7 @@ fn damaged_work_is_made_again() {
         ("triples", "cells.own"),
         ("stitch/orient", "triples.own"),
         ("relax", "points"),
-        ("repair", "points"),
+        ("export", "points"),
     ] {
         // Measured positions are needed to the end.
         let case = Case::new(&["--smooth", "0"]);
