@@ -65,7 +65,11 @@ impl Job {
                 call::Answer::Mesh { output, .. } => Some(output.clone()),
                 _ => None,
             };
-            Ok(Outcome::Answer((answer.json()?, answer.told(keyword), output)))
+            Ok(Outcome::Answer((
+                answer.json()?,
+                answer.told(keyword),
+                output,
+            )))
         })
     }
 
