@@ -394,7 +394,7 @@ impl Info {
         lines + "\n"
     }
 
-    /// What is known of the cloud, by name; what is empty is not shown.
+    /// The lines about the cloud: the name and the text of each. A line without text is not printed.
     fn rows(&self, spell: impl Fn(&Setting) -> String) -> [(&'static str, String); 16] {
         let three = |p: &[f64; 3]| format!("{} {} {}", p[0], p[1], p[2]);
         let spread =

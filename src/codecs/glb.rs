@@ -1,4 +1,5 @@
-//! What files of binary glTF have in common.
+//! What all files of binary glTF (GLB) share: the header, numbers that glTF gives to types and uses, and the
+//! JSON of a compressed part of the buffer.
 
 use serde_json::{Value, json};
 

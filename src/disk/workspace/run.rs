@@ -311,8 +311,7 @@ impl ResumableRun {
         records.try_for_each(|record| self.journal.append(record))
     }
 
-    /// Deletes the segments `leaving` of the file `name`. If tasks share the run, those of other processes are
-    /// kept until the others know.
+    /// Deletes the segments `leaving` of the file `name`. If tasks share the run, those of other processes stay.
     ///
     /// # Errors
     /// [`crate::error::Error::Io`], [`crate::error::Error::Disk`].
@@ -321,8 +320,9 @@ impl ResumableRun {
         self.journal.append(Record::Deleted(name.to_owned()))?;
         if self.is_shared() {
             let mut made = lock(&self.made);
-            let own: Vec<_> = leaving.filter(|l| made.remove(&l.0.path)).collect();
-            return self.keeper.delete(own.into_iter());
+            return self
+                .keeper
+                .delete(leaving.filter(|l| made.remove(&l.0.path)));
         }
         self.keeper.delete(leaving)
     }

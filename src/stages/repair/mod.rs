@@ -157,8 +157,8 @@ impl RepairOptions {
 
 adds!(
     RepairStats: bridges_removed, components_found, components_removed, component_triangles_removed,
-    gaps_closed, holes_found, holes_filled, holes_clipped,
-    holes_outline, holes_too_long, holes_not_filled, hole_triangles
+    gaps_closed, holes_found, holes_filled, holes_clipped, holes_outline, holes_too_long, holes_not_filled,
+    hole_triangles
 );
 
 /// Repairs and orients the surface. Deletes the files of `stitched` on the way: nobody else has them.

@@ -292,9 +292,8 @@ impl Build<'_> {
         let triangles = around.load(unit, block)?;
         let shape = self.places.shape.slice(ids.indices())?;
         let lists = bytes_of(&triangles) + bytes_of(&shape);
-        let mut held = unit.hold(lists);
+        let mut held = unit.hold(lists + Patch::estimate(triangles.len(), ids.len()));
         let mut stats = RepairStats::default();
-        held.set(lists + Patch::estimate(triangles.len(), ids.len()));
         let patch = Patch::of(ids, &triangles);
         held.set(lists + patch.bytes());
         let bridges = if self.options.repair {
