@@ -87,12 +87,12 @@ constants! {
     off_surface: OffSurface {
         /// A point whose neighbours reach far is off the surface if they fill space: their scatter along the
         /// normal is more than one part in this number of the total scatter. On a surface with noise of one
-        /// spacing it is a sixth.
+        /// spacing it is a sixth. Or if it is beside their plane, which has no constant.
         space: f64 = 7.0, "one part in", [6.0, 9.0];
-        /// Or if it is farther from the plane of its neighbours than this share of their reach. A bird over
-        /// the ground is above it, a coarse point beside a dense area is not. Nor does smoothing move a point
-        /// that far.
-        beside: f64 = 0.5, "reaches", [0.35, 0.7];
+        /// A coarse point may have longer triangles if this share of its neighbours, the nearer ones, lie neither on
+        /// a line nor on a band, unlike those of a wire. With 0.5 more of a terrain with a square 32 times denser is
+        /// torn; with 0.75 triangles hang between wires and birds.
+        nearer: f64 = 0.67, "of the neighbours", [0.5, 0.75];
     }
     /// Smoothing by a curved surface, which also distinguishes edges from noise.
     smoothing: Smoothing {
@@ -117,6 +117,8 @@ constants! {
         /// Squared height over the first surface at which weights vanish: points across an edge lose their
         /// weight.
         height2: f64 = 4.0, "mean squares";
+        /// A point whose foot is farther away is an outlier and does not move.
+        farthest: f64 = 0.5, "distances of the last neighbour", [0.35, 0.7];
         /// Ridge that keeps a surface bounded where the points do not determine it.
         ridge: f64 = 1e-3, "weights of all points";
         /// A curved surface is used if the squared heights over a plane are more than this many times those

@@ -129,16 +129,21 @@ impl Moments {
         (along, x * x + y * y + z * z)
     }
 
-    /// True if the point is beside the plane with `normal` through the centroid of its neighbours: farther
-    /// from it than a share of the distance that the neighbours reach, whose square is `last2`.
+    /// True if the point is beside the surface of its neighbours: farther from the plane through them alone than
+    /// they are from their centroid (root mean square). A bird is beside the ground; a coarse point at the edge of a
+    /// dense area is not, because it is on the plane.
     #[must_use]
-    pub fn is_beside(&self, normal: Normal, last2: u64) -> bool {
-        let n = normal.map(f64::from);
-        let s = self.sum.map(|sum| sum as f64);
-        let along = s[0] * n[0] + s[1] * n[1] + s[2] * n[2];
-        let length2 = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
-        let limit = METHOD.off_surface.beside * self.count as f64;
-        along * along > limit * limit * (last2 as f64 * length2)
+    pub fn is_beside(&self) -> bool {
+        let (m, s) = (i128::from(self.count), self.sum.map(i128::from));
+        let scatter = |i: usize| m * self.products[i] - s[PAIRS[i].0] * s[PAIRS[i].1];
+        let scatter: [f64; 6] = std::array::from_fn(|i| scatter(i) as f64);
+        let Some(normal) = least_direction(&scatter) else {
+            return false;
+        };
+        let [x, y, z] = normal.map(f64::from);
+        let [sx, sy, sz] = self.sum.map(|sum| sum as f64);
+        let along = sx * x + sy * y + sz * z;
+        along * along > (scatter[0] + scatter[1] + scatter[2]) * (x * x + y * y + z * z)
     }
 
     /// True if a direction suits the point and its neighbours as well as the `estimated` one, or nearly: their scatter

@@ -79,9 +79,9 @@ const MOST_NOISE: u8 = 1;
 pub enum Standing {
     /// As is usual in its patch.
     Usual,
-    /// Coarser than its patch, as [`coarseness`] says, and without much noise.
+    /// Coarser than its patch, as [`coarseness`] says, without much noise, and not on a line such as a wire.
     Coarse(u8),
-    /// Off the surface: its neighbours reach far for the region, and do not lie on one surface with it.
+    /// Off the surface: its neighbours reach far for the region, and fill space or lie on a surface beside it.
     Off,
 }
 
@@ -105,6 +105,24 @@ pub struct Density<'a> {
 fn is_far(last2: u64, usual2: u64) -> bool {
     let reach = METHOD.disk.reach;
     last2 as f64 > reach * reach * usual2 as f64
+}
+
+/// True if a point and the nearer of its neighbours, at the differences `near` by axis, spread over a surface. On a
+/// wire they lie on a line.
+fn nearer_spread_out(near: [&[i32]; 3]) -> bool {
+    let [x, y, z] = near;
+    let points = || (0..x.len()).map(|i| [x[i], y[i], z[i]]);
+    let mut distances: Vec<u64> = points().map(|at| distance2(at, [0; 3])).collect();
+    let count = (METHOD.off_surface.nearer * distances.len() as f64) as usize;
+    let Some(last) = count.checked_sub(1) else {
+        return false;
+    };
+    let last2 = *distances.select_nth_unstable(last).1;
+    let mut moments = Moments::default();
+    points()
+        .filter(|at| distance2(*at, [0; 3]) <= last2)
+        .for_each(|at| moments.add(at.map(i64::from)));
+    moments.plane().wide
 }
 
 /// The square of the local spacing: the mean spacing of `neighbors` points that fill a plane disk of squared
@@ -180,16 +198,22 @@ impl Density<'_> {
         usual2.saturating_mul(COARSER[usize::from(level)])
     }
 
-    /// How a point with the plane `normal` through its neighbours lies to them. The last of its `k` nearest is
-    /// at the squared distance `last2`.
+    /// How a point with the plane `normal` through its neighbours lies to them. Its `k` nearest are at the
+    /// differences `near`, the last of them at the squared distance `last2`.
     #[must_use]
-    pub fn standing(&self, id: Id, last2: u64, moments: &Moments, normal: Normal) -> Standing {
+    pub fn standing(
+        &self,
+        id: Id,
+        last2: u64,
+        (moments, normal): (&Moments, Normal),
+        near: [&[i32]; 3],
+    ) -> Standing {
         let coarseness = coarseness(last2, self.spacings.usual2(id));
         let region2 = self.spacings.stored.regions2[id.index() / METHOD.curve.block as usize];
         let far = self.limits.off_surface && is_far(last2, region2);
-        if far && (moments.fill_space(normal) || moments.is_beside(normal, last2)) {
+        if far && (moments.fill_space(normal) || moments.is_beside()) {
             Standing::Off
-        } else if coarseness > 0 && self.noise_at(id) <= MOST_NOISE {
+        } else if coarseness > 0 && self.noise_at(id) <= MOST_NOISE && nearer_spread_out(near) {
             Standing::Coarse(coarseness)
         } else {
             Standing::Usual

@@ -64,13 +64,15 @@ pub fn smooth(points: &[Point], k: usize) -> Vec<Point> {
 /// True if a point lies too far from its neighbours for a point of the surface.
 fn is_off_surface(points: &[Point], i: usize, settings: &Settings, density: &mut Density) -> bool {
     let others = by_distance(points, i);
-    let last = others[..settings.neighbors.min(others.len())].last();
+    let nearest: Vec<Point> = others
+        .iter()
+        .take(settings.neighbors)
+        .map(|&j| sub(points[j], points[i]).map(|d| d as i32))
+        .collect();
     let (moments, plane, _) = widened_plane(points, i, settings.neighbors, settings.robust);
-    let (Some(&last), Some(normal)) = (last, plane.normal) else {
-        return false;
-    };
-    let last2 = distance2(points[i], points[last]);
-    density.is_off_surface(i, last2, (&moments, &plane), normal)
+    plane
+        .normal
+        .is_some_and(|normal| density.is_off_surface(i, &nearest, &moments, normal))
 }
 
 /// The plane of a point, through more neighbours than `k` if these lie on a line or, with `bands`, on a band;

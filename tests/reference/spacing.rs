@@ -4,7 +4,7 @@ use super::Settings;
 use super::cells::by_distance;
 use super::insert::normal;
 use super::surface::Triangle;
-use outcrop_geom::plane::{Moments, Normal, Plane};
+use outcrop_geom::plane::{Moments, Normal};
 use outcrop_geom::{Point, distance2};
 
 /// Ids in a patch, and patches in a region.
@@ -39,6 +39,22 @@ fn is_far(last2: u64, usual2: u64) -> bool {
     u128::from(last2) > 4 * u128::from(usual2)
 }
 
+/// True if the point and two thirds of its neighbours, the nearer ones and those as far as the last of them, lie
+/// neither on a line nor on a band.
+fn nearer_spread_out(nearest: &[Point]) -> bool {
+    let Some(last) = (67 * nearest.len() / 100).checked_sub(1) else {
+        return false;
+    };
+    let reach2 = distance2(nearest[last], [0; 3]);
+    let mut moments = Moments::default();
+    for &at in nearest {
+        if distance2(at, [0; 3]) <= reach2 {
+            moments.add(at.map(i64::from));
+        }
+    }
+    moments.plane().wide
+}
+
 /// Measures a cloud before points move.
 pub fn measure(points: &[Point], settings: &Settings) -> Density {
     let ids: Vec<usize> = (0..points.len()).collect();
@@ -64,23 +80,24 @@ pub fn measure(points: &[Point], settings: &Settings) -> Density {
 }
 
 impl Density {
-    /// Looks at a point with the last of `N_k` at this distance, and with this plane of its neighbours: true if
+    /// Looks at a point with the differences to `N_k`, nearest first, and the sums and normal of its plane: true if
     /// it is off the surface. Notes how coarse it is.
     pub fn is_off_surface(
         &mut self,
         id: usize,
-        last2: u64,
-        (moments, plane): (&Moments, &Plane),
+        nearest: &[Point],
+        moments: &Moments,
         normal: Normal,
     ) -> bool {
+        let last2 = nearest.last().map_or(0, |&at| distance2(at, [0; 3]));
         let usual2 = u128::from(self.usual2[id / PATCH]);
         let allowed =
             |factor: &u64| usual2 > 0 && u128::from(last2) >= u128::from(*factor) * usual2;
         let far = !self.settings.keep_all && is_far(last2, self.regions2[id / (PATCH * REGION)]);
-        if far && (moments.fill_space(normal) || moments.is_beside(normal, last2)) {
+        if far && (moments.fill_space(normal) || moments.is_beside()) {
             return true;
         }
-        if plane.wide && self.noise[id] <= 1 {
+        if self.noise[id] <= 1 && nearer_spread_out(nearest) {
             self.coarse[id] = [4, 16, 256].into_iter().rfind(allowed).unwrap_or(1);
         }
         false

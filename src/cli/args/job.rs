@@ -143,8 +143,8 @@ pub struct Surface {
     /// with --method paper 60]
     #[arg(long, value_name = "DEGREES")]
     pub max_angle: Option<f64>,
-    /// Keep points off the surface, such as birds, dust and wires: those more than five times as far from
-    /// their neighbours as is usual around them
+    /// Keep points off the surface, such as birds and dust: those more than twice as far from their neighbours as
+    /// is usual around them that fill space with these or lie beside their surface
     #[arg(long)]
     pub keep_all: bool,
     /// Longest side of a triangle: a length in the cloud's unit, a number of local spacings like 8x, or none

@@ -216,25 +216,25 @@ impl<'a> CellMaker<'a> {
         directions.map_or_else(Default::default, |d| (d.bytes(), d.stats()))
     }
 
-    /// The normal and the radius of a point's disk, or the reason why it has none.
+    /// The normal and the radius of a point's disk, or the reason why it has none. Its nearest neighbours are at
+    /// the differences `near`, by axis.
     pub(super) fn disk(
         &mut self,
         id: Id,
         fit: &Fit,
+        near: [&[i32]; 3],
     ) -> std::result::Result<(Normal, f64), Outcome> {
         let estimated = fit.plane.normal;
         let directions = self.directions.as_mut();
-        let near = (&fit.moments, fit.last2);
-        let normal = directions.map_or(estimated, |d| d.choose(id, estimated, near));
+        let fitted = (&fit.moments, fit.last2);
+        let normal = directions.map_or(estimated, |d| d.choose(id, estimated, fitted));
         let normal = normal.ok_or(Outcome::NoPlane)?;
         // How a point lies to its neighbours depends on their plane, not on what the point says.
         if let (Some(density), Some(plane)) = (self.density, estimated) {
-            match density.standing(id, fit.near2, &fit.moments, plane) {
+            match density.standing(id, fit.near2, (&fit.moments, plane), near) {
                 Standing::Off => return Err(Outcome::OffSurface),
-                Standing::Coarse(level) if level > 0 && fit.plane.wide => {
-                    self.coarse.push((id, level));
-                }
-                Standing::Coarse(_) | Standing::Usual => {}
+                Standing::Coarse(level) => self.coarse.push((id, level)),
+                Standing::Usual => {}
             }
         }
         let radius = match self.radius {
@@ -244,9 +244,12 @@ impl<'a> CellMaker<'a> {
         Ok((normal, radius))
     }
 
-    /// Starts the cell of a point, or returns the reason why it has none.
-    fn start(&mut self, id: Id, fit: &Fit) -> std::result::Result<(), Outcome> {
-        let (normal, radius) = self.disk(id, fit)?;
+    /// Starts the cell of a point with the neighbours `near`, or returns the reason why it has none.
+    fn start(&mut self, id: Id, fit: &Fit, near: &Neighbors) -> std::result::Result<(), Outcome> {
+        let all = near.columns();
+        let count = self.neighbors.min(near.len());
+        let near = [all.x, all.y, all.z].map(|axis| &axis[..count]);
+        let (normal, radius) = self.disk(id, fit, near)?;
         self.cell.start(id.get(), normal, radius);
         Ok(())
     }
@@ -264,7 +267,7 @@ impl<'a> CellMaker<'a> {
         let Some(fit) = fit_from(query, self.neighbors, self.widen)? else {
             return Ok(Outcome::Uncertain);
         };
-        if let Err(outcome) = self.start(Id::new(query.id()), &fit) {
+        if let Err(outcome) = self.start(Id::new(query.id()), &fit, query.near()) {
             return Ok(outcome);
         }
         Ok(self.clip(query, each))
@@ -305,7 +308,7 @@ impl<'a> CellMaker<'a> {
         let Some(fit) = fit_from(&mut source, self.neighbors, self.widen)? else {
             return Ok(Outcome::Uncertain);
         };
-        if let Err(outcome) = self.start(id, &fit) {
+        if let Err(outcome) = self.start(id, &fit, &source.1) {
             return Ok(outcome);
         }
         let (mut walk, mut near) = source;

@@ -60,7 +60,8 @@ impl CellMaker<'_> {
             if !self.widen.is_enough(&fit.plane) {
                 continue;
             }
-            match self.disk(Id::new(member.id), &fit) {
+            let near = member.differences().map(|axis| &axis[..self.neighbors]);
+            match self.disk(Id::new(member.id), &fit, near) {
                 Err(outcome) => outcomes[place] = Some(outcome),
                 Ok((normal, radius)) => {
                     places.push(place);

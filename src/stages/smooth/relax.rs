@@ -92,7 +92,7 @@ impl Noisy {
 
     /// The position to which it moves. An outlier, which is too far from the surface, stays.
     fn moved(&self, Foot { offset, .. }: Foot) -> Point {
-        let limit = METHOD.off_surface.beside;
+        let limit = METHOD.smoothing.farthest;
         let length2 = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2];
         if length2 > limit * limit * self.reach2 as f64 {
             self.point
