@@ -85,14 +85,14 @@ constants! {
     }
     /// Points off the surface, such as birds, dust and wires.
     off_surface: OffSurface {
-        /// A point whose neighbours reach far is off the surface if they fill space: their scatter along the
-        /// normal is more than one part in this number of the total scatter. On a surface with noise of one
-        /// spacing it is a sixth. Or if it is beside their plane, which has no constant.
-        space: f64 = 7.0, "one part in", [6.0, 9.0];
-        /// A coarse point may have longer triangles if this share of its neighbours, the nearer ones, lie neither on
-        /// a line nor on a band, unlike those of a wire. With 0.5 more of a terrain with a square 32 times denser is
-        /// torn; with 0.75 triangles hang between wires and birds.
+        /// This share of the neighbours, the nearer ones, tells whether a point whose neighbours reach far is off
+        /// the surface, and whether a coarse one may have longer triangles: if they lie neither on a line nor on a
+        /// band, unlike those of a wire. With 0.75 triangles hang between wires and birds. All neighbours of a point
+        /// of a thin sheet fill space, the nearer ones do not.
         nearer: f64 = 0.67, "of the neighbours", [0.5, 0.75];
+        /// It is off the surface if they fill space: their scatter along the normal is more than one part in this
+        /// number of the total scatter. Or if it is beside the plane of its neighbours, which needs no constant.
+        space: f64 = 8.0, "one part in", [6.0, 10.0];
     }
     /// Smoothing by a curved surface, which also distinguishes edges from noise.
     smoothing: Smoothing {

@@ -8,7 +8,7 @@ use outcrop_disk::workspace::memory::Reservation;
 use outcrop_geom::Point;
 use outcrop_geom::distance2;
 use outcrop_geom::method::METHOD;
-use outcrop_geom::plane::{Moments, Normal};
+use outcrop_geom::plane::Moments;
 use outcrop_geom::triangle::area;
 use serde::{Deserialize, Serialize};
 
@@ -107,22 +107,21 @@ fn is_far(last2: u64, usual2: u64) -> bool {
     last2 as f64 > reach * reach * usual2 as f64
 }
 
-/// True if a point and the nearer of its neighbours, at the differences `near` by axis, spread over a surface. On a
-/// wire they lie on a line.
-fn nearer_spread_out(near: [&[i32]; 3]) -> bool {
+/// The moments of the nearer of a point's neighbours, which are at the differences `near` by axis: a share of them,
+/// and others as far as the last of these.
+fn nearer(near: [&[i32]; 3]) -> Moments {
     let [x, y, z] = near;
     let points = || (0..x.len()).map(|i| [x[i], y[i], z[i]]);
     let mut distances: Vec<u64> = points().map(|at| distance2(at, [0; 3])).collect();
     let count = (METHOD.off_surface.nearer * distances.len() as f64) as usize;
-    let Some(last) = count.checked_sub(1) else {
-        return false;
-    };
-    let last2 = *distances.select_nth_unstable(last).1;
     let mut moments = Moments::default();
-    points()
-        .filter(|at| distance2(*at, [0; 3]) <= last2)
-        .for_each(|at| moments.add(at.map(i64::from)));
-    moments.plane().wide
+    if let Some(last) = count.checked_sub(1) {
+        let last2 = *distances.select_nth_unstable(last).1;
+        points()
+            .filter(|at| distance2(*at, [0; 3]) <= last2)
+            .for_each(|at| moments.add(at.map(i64::from)));
+    }
+    moments
 }
 
 /// The square of the local spacing: the mean spacing of `neighbors` points that fill a plane disk of squared
@@ -198,22 +197,22 @@ impl Density<'_> {
         usual2.saturating_mul(COARSER[usize::from(level)])
     }
 
-    /// How a point with the plane `normal` through its neighbours lies to them. Its `k` nearest are at the
-    /// differences `near`, the last of them at the squared distance `last2`.
+    /// How a point with these moments lies to its neighbours. Its `k` nearest are at the differences `near`, by axis,
+    /// the last of them at the squared distance `last2`.
     #[must_use]
-    pub fn standing(
-        &self,
-        id: Id,
-        last2: u64,
-        (moments, normal): (&Moments, Normal),
-        near: [&[i32]; 3],
-    ) -> Standing {
+    pub fn standing(&self, id: Id, last2: u64, moments: &Moments, near: [&[i32]; 3]) -> Standing {
         let coarseness = coarseness(last2, self.spacings.usual2(id));
         let region2 = self.spacings.stored.regions2[id.index() / METHOD.curve.block as usize];
         let far = self.limits.off_surface && is_far(last2, region2);
-        if far && (moments.fill_space(normal) || moments.is_beside()) {
+        if !far && coarseness == 0 {
+            return Standing::Usual;
+        }
+        let nearer = nearer(near);
+        let plane = nearer.plane();
+        let fills_space = || plane.normal.is_some_and(|normal| nearer.fill_space(normal));
+        if far && (fills_space() || moments.is_beside()) {
             Standing::Off
-        } else if coarseness > 0 && self.noise_at(id) <= MOST_NOISE && nearer_spread_out(near) {
+        } else if coarseness > 0 && self.noise_at(id) <= MOST_NOISE && plane.wide {
             Standing::Coarse(coarseness)
         } else {
             Standing::Usual

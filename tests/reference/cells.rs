@@ -70,9 +70,7 @@ fn is_off_surface(points: &[Point], i: usize, settings: &Settings, density: &mut
         .map(|&j| sub(points[j], points[i]).map(|d| d as i32))
         .collect();
     let (moments, plane, _) = widened_plane(points, i, settings.neighbors, settings.robust);
-    plane
-        .normal
-        .is_some_and(|normal| density.is_off_surface(i, &nearest, &moments, normal))
+    plane.normal.is_some() && density.is_off_surface(i, &nearest, &moments)
 }
 
 /// The plane of a point, through more neighbours than `k` if these lie on a line or, with `bands`, on a band;

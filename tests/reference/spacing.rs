@@ -4,7 +4,7 @@ use super::Settings;
 use super::cells::by_distance;
 use super::insert::normal;
 use super::surface::Triangle;
-use outcrop_geom::plane::{Moments, Normal};
+use outcrop_geom::plane::Moments;
 use outcrop_geom::{Point, distance2};
 
 /// Ids in a patch, and patches in a region.
@@ -39,20 +39,19 @@ fn is_far(last2: u64, usual2: u64) -> bool {
     u128::from(last2) > 4 * u128::from(usual2)
 }
 
-/// True if the point and two thirds of its neighbours, the nearer ones and those as far as the last of them, lie
-/// neither on a line nor on a band.
-fn nearer_spread_out(nearest: &[Point]) -> bool {
+/// The moments of two thirds of the neighbours, the nearer ones and those as far as the last of them.
+fn nearer(nearest: &[Point]) -> Moments {
+    let mut moments = Moments::default();
     let Some(last) = (67 * nearest.len() / 100).checked_sub(1) else {
-        return false;
+        return moments;
     };
     let reach2 = distance2(nearest[last], [0; 3]);
-    let mut moments = Moments::default();
     for &at in nearest {
         if distance2(at, [0; 3]) <= reach2 {
             moments.add(at.map(i64::from));
         }
     }
-    moments.plane().wide
+    moments
 }
 
 /// Measures a cloud before points move.
@@ -80,24 +79,21 @@ pub fn measure(points: &[Point], settings: &Settings) -> Density {
 }
 
 impl Density {
-    /// Looks at a point with the differences to `N_k`, nearest first, and the sums and normal of its plane: true if
+    /// Looks at a point with the differences to `N_k`, nearest first, and the sums of its plane: true if
     /// it is off the surface. Notes how coarse it is.
-    pub fn is_off_surface(
-        &mut self,
-        id: usize,
-        nearest: &[Point],
-        moments: &Moments,
-        normal: Normal,
-    ) -> bool {
+    pub fn is_off_surface(&mut self, id: usize, nearest: &[Point], moments: &Moments) -> bool {
         let last2 = nearest.last().map_or(0, |&at| distance2(at, [0; 3]));
         let usual2 = u128::from(self.usual2[id / PATCH]);
         let allowed =
             |factor: &u64| usual2 > 0 && u128::from(last2) >= u128::from(*factor) * usual2;
         let far = !self.settings.keep_all && is_far(last2, self.regions2[id / (PATCH * REGION)]);
-        if far && (moments.fill_space(normal) || moments.is_beside()) {
+        let nearer = nearer(nearest);
+        let plane = nearer.plane();
+        let fills_space = plane.normal.is_some_and(|normal| nearer.fill_space(normal));
+        if far && (fills_space || moments.is_beside()) {
             return true;
         }
-        if self.noise[id] <= 1 && nearer_spread_out(nearest) {
+        if self.noise[id] <= 1 && plane.wide {
             self.coarse[id] = [4, 16, 256].into_iter().rfind(allowed).unwrap_or(1);
         }
         false

@@ -230,8 +230,8 @@ impl<'a> CellMaker<'a> {
         let normal = directions.map_or(estimated, |d| d.choose(id, estimated, fitted));
         let normal = normal.ok_or(Outcome::NoPlane)?;
         // How a point lies to its neighbours depends on their plane, not on what the point says.
-        if let (Some(density), Some(plane)) = (self.density, estimated) {
-            match density.standing(id, fit.near2, (&fit.moments, plane), near) {
+        if let (Some(density), Some(_)) = (self.density, estimated) {
+            match density.standing(id, fit.near2, &fit.moments, near) {
                 Standing::Off => return Err(Outcome::OffSurface),
                 Standing::Coarse(level) => self.coarse.push((id, level)),
                 Standing::Usual => {}
