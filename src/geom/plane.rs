@@ -111,7 +111,7 @@ impl Moments {
     }
 
     /// True if the point and its neighbours fill space instead of lying along a surface: their scatter along
-    /// the normal is more than an eighth of that in all directions.
+    /// the normal is more than a tenth of that in all directions.
     #[must_use]
     pub fn fill_space(&self, normal: Normal) -> bool {
         let [xx, yy, zz, ..] = self.scatter();
