@@ -91,7 +91,8 @@ constants! {
         /// of a thin sheet fill space, the nearer ones do not.
         nearer: f64 = 0.67, "of the neighbours", [0.5, 0.75];
         /// It is off the surface if they fill space: their scatter along the normal is more than one part in this
-        /// number of the total scatter. With 8, a cloud with 1 % of strewn points has F 98.2 instead of 99.5. Or if it is beside the plane of its neighbours, which needs no constant.
+        /// number of the total scatter; or if it is beside the plane of its neighbours, which needs no constant.
+        /// With 8, a cloud with 1 % of strewn points has F 98.2 instead of 99.5.
         space: f64 = 10.0, "one part in", [8.0, 12.0];
     }
     /// Smoothing by a curved surface, which also distinguishes edges from noise.
