@@ -313,4 +313,73 @@ mod tests {
             prop_assert_eq!(density.is_long()(t, at), density.exceeds(edge, t, at));
         }
     }
+
+    /// How a point at the origin lies to its neighbours, where they usually reach a tenth as far.
+    fn standing_among(near: &[Point]) -> Standing {
+        let axis = |k: usize| near.iter().map(|at| at[k]).collect::<Vec<i32>>();
+        let axes = [0, 1, 2].map(axis);
+        let mut moments = Moments::default();
+        near.iter().for_each(|at| moments.add(at.map(i64::from)));
+        let last2 = near.iter().map(|at| distance2(*at, [0; 3])).max();
+        let last2 = last2.expect("neighbours");
+        let limits = Limits {
+            off_surface: true,
+            edge: Width::Any,
+            fill: Width::Any,
+        };
+        let spacings = spacings(vec![last2 / 100]);
+        let density = Density {
+            spacings: &spacings,
+            noise: None,
+            coarse: None,
+            neighbors: near.len(),
+            limits,
+        };
+        density.standing(
+            Id::at(0),
+            last2,
+            &moments,
+            axes.each_ref().map(Vec::as_slice),
+        )
+    }
+
+    /// 25 points on a square patch with this place of its centre.
+    fn patch([x, y, z]: Point) -> Vec<Point> {
+        let side = || (-2..=2).map(|i| 10 * i);
+        side()
+            .flat_map(|u| side().map(move |v| [x + u, y + v, z + (u * v) / 100]))
+            .collect()
+    }
+
+    #[test]
+    fn a_bird_is_off_the_surface_and_a_coarse_point_beside_a_dense_patch_is_not() {
+        assert_eq!(standing_among(&patch([0, 0, -100])), Standing::Off);
+        assert_eq!(standing_among(&patch([30, 0, -100])), Standing::Off);
+        assert_eq!(standing_among(&patch([150, 0, 0])), Standing::Coarse(2));
+    }
+
+    #[test]
+    fn a_point_of_a_wire_is_not_coarse() {
+        let wire: Vec<Point> = (-12..=12)
+            .filter(|i| *i != 0)
+            .map(|i| [20 * i, 3 * i, i % 2])
+            .collect();
+        assert_eq!(standing_among(&wire), Standing::Usual);
+    }
+
+    #[test]
+    fn a_point_of_a_thin_sheet_is_not_off_it() {
+        let sheet = (-3i32..=3).flat_map(|u| (-3i32..=3).map(move |v| [10 * u, 10 * v, 0]));
+        let own = sheet
+            .clone()
+            .filter(|at| *at != [0; 3] && at[0].abs() + at[1].abs() <= 30);
+        let other = sheet.filter(|at| at[0].abs() + at[1].abs() <= 10);
+        let near: Vec<Point> = own.chain(other.map(|[x, y, _]| [x, y, 29])).collect();
+        assert_ne!(standing_among(&near), Standing::Off);
+        let strewn: Vec<Point> = (0..27)
+            .map(|i| [i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1].map(|c| 20 * c))
+            .filter(|at| *at != [0; 3])
+            .collect();
+        assert_eq!(standing_among(&strewn), Standing::Off);
+    }
 }
