@@ -83,7 +83,7 @@ constants! {
         /// Most rounds. Another round finds outliers for which even the reference consists of outliers.
         rounds: u32 = 4, "rounds";
     }
-    /// Points off the surface, such as birds, dust and wires.
+    /// Points off the surface, such as birds and dust, and coarse points.
     off_surface: OffSurface {
         /// This share of the neighbours, the nearer ones, tells whether a point whose neighbours reach far is off
         /// the surface, and whether a coarse one may have longer triangles: if they lie neither on a line nor on a

@@ -82,7 +82,7 @@ impl Moments {
         }
     }
 
-    /// Covariance times the number of points, the point itself included, in squared steps.
+    /// Covariance times the squared number of points, the point itself included, in squared steps.
     #[inline(always)]
     fn scatter(&self) -> [f64; 6] {
         // The common case: everything fits machine words.
@@ -100,12 +100,13 @@ impl Moments {
         if fits {
             return scatter;
         }
-        self.wide_scatter().map(|x| x as f64)
+        self.wide_scatter(m).map(|x| x as f64)
     }
 
+    /// As [`Moments::scatter`], exactly, of `m` points: with the point itself or without it.
     #[cold]
-    fn wide_scatter(&self) -> [i128; 6] {
-        let m = i128::from(self.count + 1);
+    fn wide_scatter(&self, m: i64) -> [i128; 6] {
+        let m = i128::from(m);
         let s = self.sum.map(i128::from);
         std::array::from_fn(|i| m * self.products[i] - s[PAIRS[i].0] * s[PAIRS[i].1])
     }
@@ -133,9 +134,7 @@ impl Moments {
     /// dense area is not, because it is on the plane.
     #[must_use]
     pub fn is_beside(&self) -> bool {
-        let (m, s) = (i128::from(self.count), self.sum.map(i128::from));
-        let scatter = |i: usize| m * self.products[i] - s[PAIRS[i].0] * s[PAIRS[i].1];
-        let scatter: [f64; 6] = std::array::from_fn(|i| scatter(i) as f64);
+        let scatter = self.wide_scatter(self.count).map(|x| x as f64);
         let Some(normal) = least_direction(&scatter) else {
             return false;
         };
@@ -181,7 +180,7 @@ impl Moments {
 
     /// True if the point and all its neighbours are exactly collinear: the scatter matrix has rank one.
     fn collinear(&self) -> bool {
-        let c = self.wide_scatter();
+        let c = self.wide_scatter(self.count + 1);
         let zero = |a: i128, b: i128, ab: i128| match (a.checked_mul(b), ab.checked_mul(ab)) {
             (Some(x), Some(y)) => x == y,
             // Too large for exact arithmetic: compared in floating point.
@@ -332,7 +331,7 @@ mod tests {
         ) {
             let points: Vec<_> = points.iter().map(|p| p.map(|c| c >> shift)).collect();
             let m = moments(&points);
-            prop_assert_eq!(m.scatter(), m.wide_scatter().map(|x| x as f64));
+            prop_assert_eq!(m.scatter(), m.wide_scatter(m.count + 1).map(|x| x as f64));
         }
 
         #[test]

@@ -229,7 +229,7 @@ impl<'a> CellMaker<'a> {
         let fitted = (&fit.moments, fit.last2);
         let normal = directions.map_or(estimated, |d| d.choose(id, estimated, fitted));
         let normal = normal.ok_or(Outcome::NoPlane)?;
-        // How a point lies to its neighbours depends on their plane, not on what the point says.
+        // How a point lies to its neighbours depends on these, not on the normal that it brings.
         if let (Some(density), Some(_)) = (self.density, estimated) {
             match density.standing(id, fit.near2, &fit.moments, near) {
                 Standing::Off => return Err(Outcome::OffSurface),
