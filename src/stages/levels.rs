@@ -1,9 +1,12 @@
-//! A number from 0 to 3 for each point of a range, four in a byte.
+//! A number from 0 to 3, such as the level of noise, for each point of a range, four in a byte.
 
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::memory::Reservation;
 use std::ops::Range;
+
+/// The highest level of noise, and the largest number of rounds of smoothing that it asks for.
+pub const HIGHEST: u8 = 3;
 
 /// Numbers in a byte.
 const EACH: usize = 4;

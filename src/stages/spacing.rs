@@ -1,7 +1,7 @@
 //! Local spacing by patch, and the limits of length that follow from it.
 
 use crate::ids::{Id, Triangle};
-use crate::levels::Levels;
+use crate::levels::{HIGHEST, Levels};
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::memory::Reservation;
@@ -74,6 +74,15 @@ pub fn coarseness(last2: u64, usual2: u64) -> u8 {
 /// The largest level of noise at coarse points: strewn points have more, and are not the surface of a coarser part.
 const MOST_NOISE: u8 = 1;
 
+/// The nearest neighbours of a point, nearest first.
+#[derive(Debug, Clone, Copy)]
+pub struct Nearby<'a> {
+    /// Their ids.
+    pub ids: &'a [u32],
+    /// Their differences to the point, by axis.
+    pub differences: [&'a [i32]; 3],
+}
+
 /// How a point lies to its neighbours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Standing {
@@ -81,7 +90,8 @@ pub enum Standing {
     Usual,
     /// Coarser than its patch, as [`coarseness`] says, without much noise, and not on a line such as a wire.
     Coarse(u8),
-    /// Off the surface: its neighbours reach far for the region, and fill space or lie on a surface beside it.
+    /// Off the surface: its neighbours reach far for the region and for where they are, and fill space or lie on a
+    /// surface beside it.
     Off,
 }
 
@@ -107,10 +117,9 @@ fn is_far(last2: u64, usual2: u64) -> bool {
     last2 as f64 > reach * reach * usual2 as f64
 }
 
-/// The moments of the nearer of a point's neighbours, which are at the differences `near` by axis: a share of them,
-/// and others as far as the last of these.
-fn nearer(near: [&[i32]; 3]) -> Moments {
-    let [x, y, z] = near;
+/// The moments of the nearer of a point's neighbours: a share of them, and others as far as the last of these.
+fn nearer(near: Nearby<'_>) -> Moments {
+    let [x, y, z] = near.differences;
     let points = || (0..x.len()).map(|i| [x[i], y[i], z[i]]);
     let mut distances: Vec<u64> = points().map(|at| distance2(at, [0; 3])).collect();
     let count = (METHOD.off_surface.nearer * distances.len() as f64) as usize;
@@ -197,13 +206,12 @@ impl Density<'_> {
         usual2.saturating_mul(COARSER[usize::from(level)])
     }
 
-    /// How a point with these moments lies to its neighbours. Its `k` nearest are at the differences `near`, by axis,
-    /// the last of them at the squared distance `last2`.
+    /// How a point with these moments lies to its `k` nearest neighbours `near`, the last of which is at the squared
+    /// distance `last2`.
     #[must_use]
-    pub fn standing(&self, id: Id, last2: u64, moments: &Moments, near: [&[i32]; 3]) -> Standing {
+    pub fn standing(&self, id: Id, last2: u64, moments: &Moments, near: Nearby<'_>) -> Standing {
         let coarseness = coarseness(last2, self.spacings.usual2(id));
-        let region2 = self.spacings.stored.regions2[id.index() / METHOD.curve.block as usize];
-        let far = self.limits.off_surface && is_far(last2, region2);
+        let far = self.limits.off_surface && self.is_remote(id, last2, near.ids);
         if !far && coarseness == 0 {
             return Standing::Usual;
         }
@@ -217,6 +225,25 @@ impl Density<'_> {
         } else {
             Standing::Usual
         }
+    }
+
+    /// True if a point's neighbours `ids` reach farther than is usual in its region and, unless it has the noise of
+    /// strewn points, than is usual where the neighbours are: a coarse part of a surface lies among coarse points.
+    fn is_remote(&self, id: Id, last2: u64, ids: &[u32]) -> bool {
+        let region2 = self.spacings.stored.regions2[id.index() / METHOD.curve.block as usize];
+        is_far(last2, region2)
+            && (self.noise_at(id) == HIGHEST || is_far(last2, self.usual2_among(ids)))
+    }
+
+    /// The median of the usual reaches of the patches in which points are, squared.
+    fn usual2_among(&self, ids: &[u32]) -> u64 {
+        let usual2 = |id: &u32| self.spacings.usual2(Id::new(*id));
+        let mut all: Vec<u64> = ids.iter().map(usual2).collect();
+        let middle = all.len() / 2;
+        if all.is_empty() {
+            return 0;
+        }
+        *all.select_nth_unstable(middle).1
     }
 
     fn noise_at(&self, id: Id) -> u8 {
@@ -314,8 +341,13 @@ mod tests {
         }
     }
 
-    /// How a point at the origin lies to its neighbours, where they usually reach a tenth as far.
+    /// How a point at the origin, of the first patch, lies to its neighbours, where they usually reach a tenth as far.
     fn standing_among(near: &[Point]) -> Standing {
+        standing_in(near, 1, None)
+    }
+
+    /// As [`standing_among`]; the neighbours are of another patch, where they usually reach `there` tenths as far.
+    fn standing_in(near: &[Point], there: u64, noise: Option<u8>) -> Standing {
         let axis = |k: usize| near.iter().map(|at| at[k]).collect::<Vec<i32>>();
         let axes = [0, 1, 2].map(axis);
         let mut moments = Moments::default();
@@ -327,20 +359,27 @@ mod tests {
             edge: Width::Any,
             fill: Width::Any,
         };
-        let spacings = spacings(vec![last2 / 100]);
+        let spacings = spacings(vec![last2 / 100, there * there * last2 / 100]);
+        let levels = noise.map(|level| {
+            let mut levels = Levels::new(1);
+            levels.set(0, level);
+            levels
+        });
         let density = Density {
             spacings: &spacings,
-            noise: None,
+            noise: levels.as_ref(),
             coarse: None,
             neighbors: near.len(),
             limits,
         };
-        density.standing(
-            Id::at(0),
-            last2,
-            &moments,
-            axes.each_ref().map(Vec::as_slice),
-        )
+        let ids: Vec<u32> = (0..near.len())
+            .map(|k| (METHOD.curve.patch + k) as u32)
+            .collect();
+        let near = Nearby {
+            ids: &ids,
+            differences: axes.each_ref().map(Vec::as_slice),
+        };
+        density.standing(Id::at(0), last2, &moments, near)
     }
 
     /// 25 points on a square patch with this place of its centre.
@@ -376,10 +415,22 @@ mod tests {
         let other = sheet.filter(|at| at[0].abs() + at[1].abs() <= 10);
         let near: Vec<Point> = own.chain(other.map(|[x, y, _]| [x, y, 29])).collect();
         assert_ne!(standing_among(&near), Standing::Off);
-        let strewn: Vec<Point> = (0..27)
+        assert_eq!(standing_among(&strewn()), Standing::Off);
+    }
+
+    /// Neighbours all around.
+    fn strewn() -> Vec<Point> {
+        (0..27)
             .map(|i| [i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1].map(|c| 20 * c))
             .filter(|at| *at != [0; 3])
-            .collect();
-        assert_eq!(standing_among(&strewn), Standing::Off);
+            .collect()
+    }
+
+    #[test]
+    fn a_point_among_coarse_points_is_off_only_with_the_noise_of_strewn_points() {
+        assert_eq!(standing_in(&strewn(), 4, None), Standing::Off);
+        assert_ne!(standing_in(&strewn(), 6, None), Standing::Off);
+        assert_ne!(standing_in(&strewn(), 6, Some(2)), Standing::Off);
+        assert_eq!(standing_in(&strewn(), 6, Some(3)), Standing::Off);
     }
 }

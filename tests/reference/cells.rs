@@ -63,14 +63,14 @@ pub fn smooth(points: &[Point], k: usize) -> Vec<Point> {
 
 /// True if a point lies too far from its neighbours for a point of the surface.
 fn is_off_surface(points: &[Point], i: usize, settings: &Settings, density: &mut Density) -> bool {
-    let others = by_distance(points, i);
+    let mut others = by_distance(points, i);
+    others.truncate(settings.neighbors);
     let nearest: Vec<Point> = others
         .iter()
-        .take(settings.neighbors)
         .map(|&j| sub(points[j], points[i]).map(|d| d as i32))
         .collect();
     let (moments, plane, _) = widened_plane(points, i, settings.neighbors, settings.robust);
-    plane.normal.is_some() && density.is_off_surface(i, &nearest, &moments)
+    plane.normal.is_some() && density.is_off_surface(i, &others, &nearest, &moments)
 }
 
 /// The plane of a point, through more neighbours than `k` if these lie on a line or, with `bands`, on a band;

@@ -79,14 +79,24 @@ pub fn measure(points: &[Point], settings: &Settings) -> Density {
 }
 
 impl Density {
-    /// Looks at a point with the differences to `N_k`, nearest first, and the sums of its plane: true if
+    /// Looks at a point with `N_k` and the differences to them, nearest first, and the sums of its plane: true if
     /// it is off the surface. Notes how coarse it is.
-    pub fn is_off_surface(&mut self, id: usize, nearest: &[Point], moments: &Moments) -> bool {
+    pub fn is_off_surface(
+        &mut self,
+        id: usize,
+        ids: &[usize],
+        nearest: &[Point],
+        moments: &Moments,
+    ) -> bool {
         let last2 = nearest.last().map_or(0, |&at| distance2(at, [0; 3]));
         let usual2 = u128::from(self.usual2[id / PATCH]);
         let allowed =
             |factor: &u64| usual2 > 0 && u128::from(last2) >= u128::from(*factor) * usual2;
-        let far = !self.settings.keep_all && is_far(last2, self.regions2[id / (PATCH * REGION)]);
+        let mut among: Vec<u64> = ids.iter().map(|j| self.usual2[j / PATCH]).collect();
+        among.sort_unstable();
+        let far = !self.settings.keep_all
+            && is_far(last2, self.regions2[id / (PATCH * REGION)])
+            && (self.noise[id] == 3 || is_far(last2, among[among.len() / 2]));
         let nearer = nearer(nearest);
         let plane = nearer.plane();
         let fills_space = plane.normal.is_some_and(|normal| nearer.fill_space(normal));

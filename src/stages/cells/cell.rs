@@ -4,7 +4,7 @@
 use super::directions::{Directions, DiskStats};
 use crate::ids::Id;
 use crate::order::PointStore;
-use crate::spacing::{Density, Standing};
+use crate::spacing::{Density, Nearby, Standing};
 use crate::tiles::near::{Query, Sums};
 use crate::tiles::neighbors::Neighbors;
 use crate::tiles::walk::{PageCache, Walk};
@@ -216,13 +216,13 @@ impl<'a> CellMaker<'a> {
         directions.map_or_else(Default::default, |d| (d.bytes(), d.stats()))
     }
 
-    /// The normal and the radius of a point's disk, or the reason why it has none. Its nearest neighbours are at
-    /// the differences `near`, by axis.
+    /// The normal and the radius of a point's disk, or the reason why it has none. `near` are its nearest
+    /// neighbours.
     pub(super) fn disk(
         &mut self,
         id: Id,
         fit: &Fit,
-        near: [&[i32]; 3],
+        near: Nearby<'_>,
     ) -> std::result::Result<(Normal, f64), Outcome> {
         let estimated = fit.plane.normal;
         let directions = self.directions.as_mut();
@@ -248,7 +248,10 @@ impl<'a> CellMaker<'a> {
     fn start(&mut self, id: Id, fit: &Fit, near: &Neighbors) -> std::result::Result<(), Outcome> {
         let all = near.columns();
         let count = self.neighbors.min(near.len());
-        let near = [all.x, all.y, all.z].map(|axis| &axis[..count]);
+        let near = Nearby {
+            ids: &all.ids[..count],
+            differences: [all.x, all.y, all.z].map(|axis| &axis[..count]),
+        };
         let (normal, radius) = self.disk(id, fit, near)?;
         self.cell.start(id.get(), normal, radius);
         Ok(())

@@ -2,6 +2,7 @@
 
 use super::cell::{CellMaker, Fit, Outcome};
 use crate::ids::Id;
+use crate::spacing::Nearby;
 use crate::tiles::near::{Group, Neighborhood};
 use outcrop_geom::clip::wrap::{Site, TOGETHER};
 use outcrop_geom::kernels::Level;
@@ -60,7 +61,10 @@ impl CellMaker<'_> {
             if !self.widen.is_enough(&fit.plane) {
                 continue;
             }
-            let near = member.differences().map(|axis| &axis[..self.neighbors]);
+            let near = Nearby {
+                ids: &member.ids()[..self.neighbors],
+                differences: member.differences().map(|axis| &axis[..self.neighbors]),
+            };
             match self.disk(Id::new(member.id), &fit, near) {
                 Err(outcome) => outcomes[place] = Some(outcome),
                 Ok((normal, radius)) => {

@@ -5,6 +5,7 @@
 //! the same on every machine and do not depend on how the neighbours were found.
 
 use crate::cells::Fit;
+use crate::levels::HIGHEST;
 use crate::spacing::spacing2;
 use crate::tiles::neighbors::Neighbors;
 use outcrop_geom::method::METHOD;
@@ -12,9 +13,6 @@ use outcrop_geom::plane::Normal;
 
 /// Unknowns of a surface of second order.
 const TERMS: usize = 6;
-
-/// The highest level of noise, and the largest number of rounds of smoothing that it asks for.
-pub(super) const HIGHEST: u8 = 3;
 
 /// Measures levels of noise, in memory that is reused.
 #[derive(Debug, Default)]

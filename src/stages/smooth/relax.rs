@@ -5,13 +5,12 @@
 //! Digne et al., *Scale space meshing of raw data point sets*, Computer Graphics Forum 30, 2011).
 
 use super::foot::{Feet, Foot};
-use super::level::HIGHEST;
 use super::moves::Moves;
 use super::noise::{Found, look};
 use super::pass::Pass;
 use super::{Relaxing, moved};
 use crate::cells::{TileRanges, each_around};
-use crate::levels::Levels;
+use crate::levels::{HIGHEST, Levels};
 use crate::order::{PointStore, StoredPoints};
 use crate::spacing::{StoredSpacings, spacing2};
 use crate::tiles::near::Around;
