@@ -1,7 +1,11 @@
 //! Columns of text: by names, by the look of numbers, as the caller says; or a refusal that lists them.
 
+mod named;
+mod off;
+
 use crate::bench::Bench;
 use crate::columns::rows;
+use named::named;
 use outcrop::Error;
 use outcrop_points::{Attributes, IngestStats, Layout, Selection, Spool, ingest_selected};
 use std::path::PathBuf;
@@ -74,118 +78,6 @@ fn lines(line: impl Fn(usize, [f64; 3]) -> String) -> String {
 fn want() -> Vec<Vec<f64>> {
     let point = |i: f64| vec![i + 0.5, 10.0 * i + 0.25, 100.0 * i + 0.5];
     [1.0, 2.0, 3.0].map(point).into()
-}
-
-/// Files whose names tell where the coordinates are, and what is said about them.
-fn named() -> Vec<(&'static str, String, &'static str)> {
-    let mut files: Vec<(&str, String, &str)> = Vec::new();
-    let mut add = |name, header: &str, said, line: &dyn Fn(usize, [f64; 3]) -> String| {
-        files.push((name, header.to_owned() + &lines(line), said));
-    };
-    let livox = "Version,Slot ID,Timestamp Type,Timestamp,X,Y,Z,Reflectivity,Ori_x,Ori_y,Ori_z\n";
-    add(
-        "livox.csv",
-        livox,
-        "columns 5–7 \"X Y Z\"; intensity from column 8",
-        &|i, [x, y, z]| {
-            format!(
-                "5,1,0x00,100000{i},{x},{y},{z},{i},{},{},{}\n",
-                1000.0 * x,
-                1000.0 * y,
-                1000.0 * z
-            )
-        },
-    );
-    let bare = ",x,y,z,red,green,blue\n";
-    add(
-        "pandas.csv",
-        bare,
-        "columns 2–4 \"x y z\"; colours 8 bits from columns 5–7",
-        &|i, [x, y, z]| format!("{i},{x},{y},{z},1,{i},3\n"),
-    );
-    add(
-        "pandas.tsv",
-        &bare.replace(',', "\t"),
-        "columns 2–4 \"x y z\"",
-        &|i, [x, y, z]| format!("{i}\t{x}\t{y}\t{z}\t1\t2\t3\n"),
-    );
-    add(
-        "r.txt",
-        "\"x\" \"y\" \"z\" \"height above\"\n",
-        "columns 2–4 \"x y z\"",
-        &|i, [x, y, z]| format!("\"{i}\" {x} {y} {z} 7\n"),
-    );
-    let survey = "Point,Easting,Northing,Elevation\n";
-    add(
-        "penzd.csv",
-        survey,
-        "columns 2–4 \"Easting Northing Elevation\"; ",
-        &|i, [x, y, z]| format!("{i},{x},{y},{z},\"TREE, old\"\n"),
-    );
-    let survey = "Point ID;Northing (m);Easting (m);Height (m);Code\n";
-    add(
-        "pnezd.csv",
-        survey,
-        "columns 3, 2, 4 \"Easting (m)\", \"Northing (m)\", \"Height (m)\"",
-        &|i, [x, y, z]| {
-            let comma = |v: f64| v.to_string().replace('.', ",");
-            format!("{i};{};{};{};TREE\n", comma(y), comma(x), comma(z))
-        },
-    );
-    add("enh.txt", "N E H\n", "columns 2, 1, 3 \"E N H\"", &|_,
-                                                             [
-        x,
-        y,
-        z,
-    ]| {
-        format!("{y} {x} {z}\n")
-    });
-    add(
-        "view.csv",
-        "\"Intensity\",\"Points:0\",\"Points:1\",\"Points:2\"\n",
-        "columns 2–4",
-        &|i, [x, y, z]| format!("{i},{x},{y},{z}\n"),
-    );
-    add(
-        "units.csv",
-        "Return number,X[m],Y[m],Z[m]\n",
-        "columns 2–4 \"X[m] Y[m] Z[m]\"",
-        &|i, [x, y, z]| format!("{i},{x},{y},{z}\n"),
-    );
-    add(
-        "quoted.csv",
-        "\"M3C2, distance\",\"Z\",\"Y\",\"X\"\n",
-        "columns 4, 3, 2 \"X Y Z\"",
-        &|i, [x, y, z]| format!("{i},{z},{y},{x}\n"),
-    );
-    let colmap = "# 3D point list with one line of data per point:\n\
-        #   POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)\n\
-        # Number of points: 3, mean track length: 2.5\n";
-    add(
-        "points3D.txt",
-        colmap,
-        "columns 2–4 \"X Y Z\"; colours 8 bits from columns 5–7",
-        &|i, [x, y, z]| format!("{} {x} {y} {z} 1 2 3 0.5{}\n", 7 * i, " 4 5".repeat(i)),
-    );
-    add(
-        "percent.txt",
-        "% i x y z\n",
-        "columns 2–4 \"x y z\"",
-        &|i, [x, y, z]| format!("{i} {x} {y} {z}\n"),
-    );
-    add(
-        "behind.asc",
-        "//Nx Ny Nz X Y Z\n",
-        "columns 4–6 \"X Y Z\"",
-        &|_, [x, y, z]| format!("0 0 1 {x} {y} {z}\n"),
-    );
-    add(
-        "blank.txt",
-        "\"Point ID\" \"X (m)\" \"Y (m)\" \"Z (m)\"\n",
-        "columns 2–4",
-        &|i, [x, y, z]| format!("{i} {x} {y} {z}\n"),
-    );
-    files
 }
 
 #[test]
@@ -464,112 +356,5 @@ fn the_caller_names_columns_and_passes_over_lines() {
     assert!(
         said.starts_with("columns: ") && said.contains("a text file among the inputs"),
         "{said}"
-    );
-}
-
-#[test]
-fn vertices_of_off_are_points_and_faces_are_none() {
-    let bench = Bench::new();
-    let faces = "3 0 1 2\n3 0 2 1 255 0 0\n";
-    let plain = lines(|_, [x, y, z]| format!("{x} {y} {z}\n"));
-    let colored = lines(|_, [x, y, z]| format!("{x} {y} {z} 200 100 50 255\n"));
-    let normal = lines(|_, [x, y, z]| format!("{x} {y} {z} 0 0 1\n"));
-    for (name, text, list, more) in [
-        (
-            "a.off",
-            format!("OFF\n3 2 0\n{plain}{faces}"),
-            "none",
-            &[][..],
-        ),
-        (
-            "b.off",
-            format!("OFF 3 2 0\r\n{}{faces}", plain.replace('\n', "\r\n")),
-            "none",
-            &[],
-        ),
-        (
-            "c.off",
-            format!("# a mesh\nOFF # b\n\n3 2 0\n# c\n{plain}\n{faces}"),
-            "none",
-            &[],
-        ),
-        (
-            "d.off",
-            format!("COFF\n3 2 0\n{colored}{faces}"),
-            "color",
-            &[200.0, 100.0, 50.0],
-        ),
-        (
-            "e.off",
-            format!("NOFF\n3 2 0\n{normal}{faces}"),
-            "nz",
-            &[1.0],
-        ),
-        (
-            "f.off",
-            format!("OFF\n3 2 0\n{colored}{faces}"),
-            "color",
-            &[200.0, 100.0, 50.0],
-        ),
-        ("g", format!("off\n3 0 0\n{plain}"), "none", &[]),
-        (
-            "h.off",
-            format!("OFF\n3 0 0\n{}", plain.trim_end()),
-            "none",
-            &[],
-        ),
-    ] {
-        let (found, stats) = points(&bench, name, &text, list);
-        let want: Vec<Vec<f64>> = want()
-            .into_iter()
-            .map(|p| [p, more.to_vec()].concat())
-            .collect();
-        assert_eq!(found, want, "{name}");
-        assert_eq!(
-            stats.warnings.len(),
-            usize::from(name == "f.off"),
-            "{:?}",
-            stats.warnings
-        );
-    }
-    for (text, said) in [
-        (format!("OFF BINARY\n3 0 0\n{plain}"), "found binary OFF"),
-        (
-            format!("4OFF\n3 0 0\n{plain}"),
-            "other than three coordinates",
-        ),
-        (
-            format!("OFF\nthree 0 0\n{plain}"),
-            "OFF header: found \"three 0 0\"",
-        ),
-        (
-            format!("OFF\n4 0 0\n{plain}"),
-            "found 4 vertices, expected at most 3",
-        ),
-        (
-            format!("OFF\n4 0 0\n{plain}1 2\n"),
-            "line 6: found \"1 2\", expected a vertex",
-        ),
-    ] {
-        let found = refusal(&bench, "a.off", &text);
-        assert!(found.contains(said), "{found}");
-    }
-}
-
-/// More than one unit of lines, with faces that look like points.
-#[test]
-fn a_large_off_ends_where_its_vertices_do() {
-    let bench = Bench::new();
-    let count = 200_000;
-    let vertices: String = (0..count)
-        .map(|i| format!("{i}.25 {} -0.5\n", i % 7))
-        .collect();
-    let faces = "3 900000 900001 900002\n".repeat(100_000);
-    let path = bench.write("a.off", format!("OFF\n{count} 100000 0\n{vertices}{faces}"));
-    let spool = bench.read(&[path]).unwrap();
-    assert_eq!(spool.points(), count);
-    assert_eq!(
-        spool.stats().files[0].max,
-        Some([count as f64 - 0.75, 6.0, -0.5])
     );
 }
