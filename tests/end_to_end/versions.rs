@@ -15,8 +15,8 @@ const MESHES: [(&str, u32); 8] = [
     ("noisy, paper", 1_777_962_663),
     ("noisy, smooth", 2_552_388_948),
     ("scan lines, robust", 3_568_111_642),
-    ("outdoor, robust", 960_381_736),
-    ("outdoor, thinned", 1_325_491_697),
+    ("outdoor, robust", 3_329_173_332),
+    ("outdoor, thinned", 3_580_250_906),
 ];
 
 fn cloud(name: &str) -> Cloud {
