@@ -49,7 +49,8 @@
 //!
 //! [`convert`] writes a finished mesh in another format.
 //!
-//! [`Tiles`] makes levels of detail of a mesh, of any size, for viewers of 3D Tiles.
+//! [`Simplification`] makes one mesh with fewer triangles of a mesh of any size, and [`Tiles`] levels of detail for
+//! viewers of 3D Tiles.
 //!
 //! [`inspect`] describes a cloud, checks that a mesh is a manifold, and measures the distance between two
 //! shapes. [`Report`] has the counts and measurements of a run. [`page`] puts all of these into pages with
@@ -57,7 +58,7 @@
 //!
 //! [`call`] runs the commands of the program inside another one.
 //!
-//! `levels`, `page`, `view`, `Tiles` and the pictures need the features `levels`, `pages` and `view`, which are on by
+//! `levels`, `page`, `view`, `Simplification`, `Tiles` and the pictures need the features `levels`, `pages` and `view`, which are on by
 //! default, like `e57` and `demo`.
 //!
 //! These items are the interface. The crates of which the program consists (`outcrop-geom`, `outcrop-disk`,
@@ -76,6 +77,7 @@ pub mod page;
 pub mod params;
 mod pipeline;
 pub mod report;
+mod write;
 
 pub use outcrop_disk::error;
 #[cfg(feature = "levels")]
@@ -101,7 +103,7 @@ pub use params::{
     Division, Facing, InputNormals, MaxWidth, Method, Origin, Params, Radius, Region, Smooth,
     Smoothing,
 };
-#[cfg(feature = "levels")]
-pub use pipeline::Tiles;
 pub use pipeline::{Builder, Reconstruction, Start, default_memory, default_threads};
+#[cfg(feature = "levels")]
+pub use pipeline::{Simplification, SimplifyReport, Tiles};
 pub use report::{DiskEstimate, Report};

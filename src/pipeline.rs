@@ -8,10 +8,14 @@ mod clock;
 mod disk;
 mod levels;
 mod manifest;
+#[cfg(feature = "levels")]
+mod mesh_job;
 mod origin;
 mod outlook;
 mod resources;
 mod shared;
+#[cfg(feature = "levels")]
+mod simplify;
 mod stages;
 mod start;
 #[cfg(feature = "levels")]
@@ -31,6 +35,8 @@ use outcrop_disk::workspace::{Folder, Storage, Workspace, limits};
 pub use shared::{
     Advanced, Begun, Status, TaskState, Totals, Worked, planned_shards, shared_folder, status,
 };
+#[cfg(feature = "levels")]
+pub use simplify::{Simplification, SimplifyReport};
 use stages::Stages;
 pub use start::Start;
 use std::path::{Path, PathBuf};

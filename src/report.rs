@@ -1,6 +1,8 @@
 //! The report of a run: the content of `--report`.
 
 use crate::params::Params;
+#[cfg(feature = "levels")]
+pub use crate::pipeline::SimplifyReport;
 pub use histogram::{Bin, Histogram};
 pub use outcrop_disk::workspace::course::Sample;
 use outcrop_draw::histogram;
@@ -38,6 +40,18 @@ impl TilesReport {
 
 #[cfg(not(feature = "levels"))]
 impl std::fmt::Display for TilesReport {
+    fn fmt(&self, _: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match *self {}
+    }
+}
+
+/// The simplified mesh of a build that makes none.
+#[cfg(not(feature = "levels"))]
+#[derive(Debug, Clone, Serialize)]
+pub enum SimplifyReport {}
+
+#[cfg(not(feature = "levels"))]
+impl std::fmt::Display for SimplifyReport {
     fn fmt(&self, _: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match *self {}
     }

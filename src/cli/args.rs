@@ -211,6 +211,50 @@ pub struct Tiles {
     pub again: Again,
 }
 
+/// `outcrop simplify`
+#[derive(Debug, ClapArgs)]
+pub struct Simplify {
+    /// The mesh (PLY, also as .zst)
+    #[arg(value_name = "MESH")]
+    pub mesh: PathBuf,
+    /// The mesh to write: .ply, .obj, .stl or .glb
+    #[arg(long, short, value_name = "OUT")]
+    pub output: PathBuf,
+    #[command(flatten)]
+    pub goal: SimplifyGoal,
+    /// Leave the boundary as it is
+    #[arg(long)]
+    pub keep_boundary: bool,
+    /// Samples of each mesh by which the distance between both is measured, e.g. 1e6; 0: it is not measured
+    #[arg(long, value_name = "N", default_value = "1000000", value_parser = count)]
+    pub samples: u64,
+    /// Most triangles of a cell
+    #[arg(long, hide = true, default_value = "131072", value_parser = clap::value_parser!(u32).range(1..))]
+    pub most_triangles: u32,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub limits: Limits,
+    #[command(flatten)]
+    pub again: Again,
+}
+
+/// How far `outcrop simplify` goes.
+#[derive(Debug, ClapArgs)]
+#[group(required = true, multiple = false)]
+pub struct SimplifyGoal {
+    /// To this number of triangles, e.g. 2e6
+    #[arg(long, value_name = "N", value_parser = count)]
+    pub triangles: Option<u64>,
+    /// To this part of the triangles, e.g. 0.1
+    #[arg(long, value_name = "R")]
+    pub ratio: Option<f64>,
+    /// As long as vertices stay within this mean distance of the triangles that they stand for
+    #[arg(long, value_name = "LENGTH")]
+    pub error: Option<f64>,
+}
+
 /// `outcrop compare`
 #[derive(Debug, ClapArgs)]
 pub struct Compare {

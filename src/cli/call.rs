@@ -25,7 +25,7 @@
 use super::command::{Args, Command};
 use super::{jobs, output};
 use crate::info::Info;
-use crate::report::{Report, TilesReport};
+use crate::report::{Report, SimplifyReport, TilesReport};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{ArgAction, CommandFactory, Parser};
 use outcrop_disk::error::{Error, Result, Setting};
@@ -55,6 +55,8 @@ pub enum Answer {
     Comparison(Box<Comparison>),
     /// Of `tiles`.
     Tiles(Box<TilesReport>),
+    /// `simplify`.
+    Simplify(Box<SimplifyReport>),
 }
 
 impl Answer {
@@ -69,6 +71,7 @@ impl Answer {
             Self::Verdict(verdict) => output::json(verdict),
             Self::Comparison(comparison) => output::json(comparison),
             Self::Tiles(report) => output::json(report),
+            Self::Simplify(report) => output::json(report),
         }
     }
 
@@ -87,6 +90,7 @@ impl Answer {
             Self::Verdict(verdict) => verdict.to_string(),
             Self::Comparison(comparison) => comparison.to_string(),
             Self::Tiles(report) => report.told(spell),
+            Self::Simplify(report) => report.to_string(),
         }
     }
 }
@@ -156,6 +160,7 @@ pub fn run<W: Into<OsString>>(
         Command::Info(args) => Answer::Info(Box::new(jobs::info(&args, watch)?)),
         Command::Verify(args) => Answer::Verdict(Box::new(jobs::verify(&args, watch)?)),
         Command::Compare(args) => Answer::Comparison(Box::new(jobs::compare(&args, watch)?)),
+        Command::Simplify(args) => Answer::Simplify(Box::new(jobs::simplify(&args, watch)?)),
         Command::Tiles(args) => Answer::Tiles(Box::new(jobs::tiles(&args, watch)?)),
         _ => {
             let why = "this command is for the command line only";

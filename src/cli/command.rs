@@ -1,6 +1,6 @@
 //! The commands and their help.
 
-use super::args::{Compare, Demo, Info, Reconstruct, Resume, Tiles, Verify, View};
+use super::args::{Compare, Demo, Info, Reconstruct, Resume, Simplify, Tiles, Verify, View};
 use super::shared::{Advance, Plan, Status, Submit, Work};
 use crate::features;
 use clap::{Parser, Subcommand};
@@ -43,6 +43,7 @@ pub const EXAMPLES: &str = "  outcrop reconstruct scan.laz -o mesh.ply
   outcrop info scan.laz
   outcrop verify mesh.ply && echo manifold
   outcrop compare mesh.ply scan.laz --html distances.html
+  outcrop simplify mesh.ply -o small.ply --triangles 2e6
   outcrop tiles mesh.ply -o town
   outcrop view mesh.ply
   outcrop demo
@@ -69,6 +70,8 @@ pub enum Command {
     Info(Info),
     /// Check that a mesh is a manifold (exit code 0 if it is, 1 if not)
     Verify(Verify),
+    /// Make a mesh with fewer triangles
+    Simplify(Simplify),
     /// Cut a mesh into levels of detail for 3D Tiles viewers
     Tiles(Tiles),
     /// Measure the distance between two meshes or clouds

@@ -1,6 +1,6 @@
 //! The commands of the program: their work, and what they print.
 
-use super::args::{Compare, Info, Quiet, Reconstruct, Resume, Tiles, Verify};
+use super::args::{Compare, Info, Quiet, Reconstruct, Resume, Simplify, Tiles, Verify};
 use super::command::Command;
 #[cfg(feature = "demo")]
 use super::demo;
@@ -23,6 +23,7 @@ pub fn run(command: Command) -> Result<Ended> {
         Command::Info(args) => info(&args),
         Command::Verify(args) => check(&args),
         Command::Compare(args) => measure(&args),
+        Command::Simplify(args) => simplify(&args),
         Command::Tiles(args) => tiles(&args),
         Command::View(args) => view::run(&args),
         Command::Demo(args) => demo::run(&args),
@@ -77,6 +78,12 @@ fn check(args: &Verify) -> Result<bool> {
 fn measure(args: &Compare) -> Result<bool> {
     let comparison = jobs::compare(args, stop::watched(args.limits.quiet))?;
     show(&comparison, args.json)?;
+    Ok(true)
+}
+
+fn simplify(args: &Simplify) -> Result<bool> {
+    let report = jobs::simplify(args, stop::watched(args.limits.quiet))?;
+    show(&report, args.json)?;
     Ok(true)
 }
 

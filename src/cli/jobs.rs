@@ -1,16 +1,18 @@
 //! The work of the commands: from arguments to results, without a word on the screen.
 
-use super::args::{Compare, Ends, Info, Limits, Reconstruct, Resume, Tiles as TilesArgs, Verify};
+use super::args::{
+    Compare, Ends, Info, Limits, Reconstruct, Resume, Simplify, Tiles as TilesArgs, Verify,
+};
 use super::output::{NewFile, is_page, report_text};
 use super::pages;
 #[cfg(not(feature = "levels"))]
 use crate::features::LEVELS;
 use crate::info;
 use crate::params::Params;
-#[cfg(feature = "levels")]
-use crate::pipeline::Tiles;
 use crate::pipeline::{Builder, Reconstruction, default_memory, default_threads};
-use crate::report::{Report, TilesReport};
+#[cfg(feature = "levels")]
+use crate::pipeline::{Simplification, Tiles};
+use crate::report::{Report, SimplifyReport, TilesReport};
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::memory::MemoryPool;
@@ -147,6 +149,43 @@ pub fn compare(args: &Compare, watch: Watch) -> Result<compare::Comparison> {
     };
     let page = NewFile::page(path)?;
     pages::compare(page, [a, b], &options, &workspace)
+}
+
+/// Makes a mesh with fewer triangles.
+#[cfg(feature = "levels")]
+pub fn simplify(args: &Simplify, (observer, cancel): Watch) -> Result<SimplifyReport> {
+    use outcrop_levels::single::{Goal, Options};
+    let goal = &args.goal;
+    let goal = match (goal.triangles, goal.ratio, goal.error) {
+        (Some(number), ..) => Goal::Triangles(number),
+        (_, Some(ratio), _) => Goal::Ratio(ratio),
+        // The command line takes one of the three.
+        (.., error) => Goal::Error(error.unwrap_or(0.0)),
+    };
+    let options = Options {
+        goal,
+        keep_boundary: args.keep_boundary,
+        most_triangles: args.most_triangles,
+    };
+    let mut job = Simplification::new(&args.mesh, &args.output, goal)
+        .options(options)
+        .samples(args.samples)
+        .memory(memory(&args.limits))
+        .threads(threads(&args.limits))
+        .storage(args.limits.storing.storage())
+        .start(args.again.start())
+        .observer(observer)
+        .cancel(cancel);
+    if let Some(scratch) = &args.limits.scratch {
+        job = job.scratch(scratch);
+    }
+    job.run()
+}
+
+/// The answer of a build without levels of detail.
+#[cfg(not(feature = "levels"))]
+pub fn simplify(_: &Simplify, _: Watch) -> Result<SimplifyReport> {
+    Err(LEVELS.missing())
 }
 
 /// Makes levels of detail.

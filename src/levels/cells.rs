@@ -4,7 +4,7 @@
 //! than [`MOST`] triangles, down to [`DEEPEST`]. Triangles are sorted along the Z-order curve, on which each cell
 //! is an interval, so that one look ahead decides.
 
-use super::intake::{BLOCK, Intake};
+use super::intake::{BLOCK, Intake, Stored};
 use super::rows::{CellTriangle, PlacedTriangle};
 use outcrop_disk::error::Result;
 use outcrop_disk::spill::{Sorter, Table};
@@ -34,6 +34,34 @@ pub(super) struct Cells {
     pub table: Table<CellTriangle>,
 }
 
+/// How triangles are divided.
+pub(super) struct Division {
+    /// Largest number of triangles of a cell, unless it cannot be divided.
+    pub most: u32,
+    /// Thirds of the cube by which the octree is moved. The planes of all its cells are then at least a third of
+    /// a cell from those of the octree that is moved by another number of thirds.
+    pub thirds: u64,
+    /// The name of the step.
+    pub step: String,
+    /// Names of the scratch files: triangles along the curve, and by cell.
+    pub placed: String,
+    pub cells: String,
+}
+
+impl Division {
+    /// The key of a position on the lattice with so many bits.
+    fn place(&self, bits: u32) -> impl Fn([u32; 3]) -> u64 + Sync + use<> {
+        let thirds = self.thirds;
+        move |point| match thirds {
+            0 => key(point, bits),
+            _ => {
+                let moved = ((1u64 << bits) * thirds / 3) as u32;
+                key(point.map(|x| x.saturating_add(moved)), bits + 1)
+            }
+        }
+    }
+}
+
 /// The key of a position on the curve: 21 bits of each coordinate, interleaved.
 pub(super) fn key(point: [u32; 3], bits: u32) -> u64 {
     point.iter().fold(0, |key, &x| {
@@ -58,12 +86,16 @@ fn spread(x: u64) -> u64 {
 }
 
 /// Divides the triangles.
-pub(super) fn divide(intake: &Intake, most: u32, workspace: &Workspace) -> Result<Cells> {
+pub(super) fn divide<C: Stored + Sync>(
+    intake: &Intake<C>,
+    manner: &Division,
+    workspace: &Workspace,
+) -> Result<Cells> {
     let (observer, total) = (&workspace.observer, intake.triangles);
-    workspace.once("cells", |unit| {
+    workspace.once(&manner.step, |unit| {
         observer.begin("divide", "triangles", 2 * total);
-        let sorted = sort(intake, workspace)?;
-        let mut cutter = Cutter::new(unit, most as usize);
+        let sorted = sort(intake, manner, workspace)?;
+        let mut cutter = Cutter::new(unit, manner);
         sorted.finish(workspace)?.for_each(|row| cutter.push(row))?;
         let cells = cutter.finish()?;
         observer.end();
@@ -71,19 +103,23 @@ pub(super) fn divide(intake: &Intake, most: u32, workspace: &Workspace) -> Resul
     })
 }
 
-fn sort(intake: &Intake, workspace: &Workspace) -> Result<Sorter<PlacedTriangle>> {
+fn sort<C: Stored + Sync>(
+    intake: &Intake<C>,
+    manner: &Division,
+    workspace: &Workspace,
+) -> Result<Sorter<PlacedTriangle>> {
     let inbox = intake.sent.open(workspace, intake.blocks())?;
     let rows = |block: usize| inbox.rows(block) as u64;
     let parts: Vec<(u32, u64)> = (0..intake.blocks())
         .map(|block| (block as u32, rows(block)))
         .filter(|part| part.1 > 0)
         .collect();
-    let bits = intake.lattice.bits;
+    let place = manner.place(intake.lattice.bits);
     let each = size_of::<PlacedTriangle>() as u64;
     let wanted = intake.triangles * each;
     let buffer = wanted.min(workspace.memory.available() / 3) + (1 << 20);
     let held = workspace.reserve("levels: sort buffers", buffer + buffer / 2)?;
-    let sorter = Sorter::new(workspace, "levels.placed", buffer).reporting(held);
+    let sorter = Sorter::new(workspace, &manner.placed, buffer).reporting(held);
     sorter.take_parts(workspace, &parts, false, |blocks| {
         let bytes = |n: usize| 60 * rows(blocks[n] as usize) + 12 * BLOCK as u64 + (1 << 20);
         workspace.for_each_unit("levels: keys", blocks.len(), bytes, |unit| {
@@ -93,7 +129,7 @@ fn sort(intake: &Intake, workspace: &Workspace) -> Result<Sorter<PlacedTriangle>
             heads.dedup();
             let mut keys = Vec::with_capacity(heads.len());
             let all = heads.iter().copied();
-            intake.vertices(unit, all, |v| keys.push(key(v.point, bits)))?;
+            intake.vertices(unit, all, |v| keys.push(place(v.point)))?;
             let mut at = 0;
             let mut placed = Vec::with_capacity(triangles.len());
             for triangle in &triangles {
@@ -123,15 +159,15 @@ struct Cutter<'a> {
 }
 
 impl<'a> Cutter<'a> {
-    fn new(unit: &'a Unit<'a>, most: usize) -> Self {
+    fn new(unit: &'a Unit<'a>, manner: &Division) -> Self {
         Self {
             unit,
-            most,
+            most: manner.most as usize,
             waiting: Vec::new(),
             before: None,
             made: Cells {
                 cells: Vec::new(),
-                table: Table::new("levels.cells", 0),
+                table: Table::new(&manner.cells, 0),
             },
         }
     }

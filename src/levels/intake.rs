@@ -1,4 +1,4 @@
-//! Reading of the mesh: vertices into parts that can be read one by one, triangles to the blocks of their
+//! Reading of a mesh: vertices into parts that can be read one by one, triangles to the blocks of their
 //! smallest vertices.
 
 use super::columns::Columns;
@@ -22,13 +22,49 @@ pub(super) const PART: usize = 1 << 10;
 /// Triangles that are sorted by block at a time.
 const BATCH: usize = 1 << 18;
 
+/// What is stored of a vertex beside its position.
+pub(super) trait Stored {
+    /// Words of a vertex.
+    fn words(&self) -> usize;
+
+    /// Values of a vertex that [`Stored::store`] takes.
+    fn values(&self) -> usize;
+
+    /// Appends the words of a vertex with these values.
+    fn store(&mut self, values: &[f64], put: impl FnMut(u32));
+}
+
+impl Stored for Columns {
+    fn words(&self) -> usize {
+        self.stored()
+    }
+
+    fn values(&self) -> usize {
+        self.wanted().len()
+    }
+
+    fn store(&mut self, values: &[f64], put: impl FnMut(u32)) {
+        Self::store(self, values, put);
+    }
+}
+
+/// What is known of a mesh before it is read, and the names of the scratch files of its vertices and triangles.
+pub(super) struct About<'a, C> {
+    pub path: &'a Path,
+    pub vertices: u64,
+    /// True if all coordinates are 32-bit floats.
+    pub floats: bool,
+    pub columns: C,
+    pub names: [&'a str; 2],
+}
+
 /// A mesh that was read.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(super) struct Intake {
+pub(super) struct Intake<C = Columns> {
     pub vertices: u64,
     pub triangles: u64,
     pub lattice: Lattice,
-    pub columns: Columns,
+    pub columns: C,
     /// Places of the parts.
     parts: Vec<Place>,
     table: Table<LevelWord>,
@@ -36,12 +72,12 @@ pub(super) struct Intake {
 }
 
 /// Words of a vertex: its position as three `f64`, and its values.
-fn words(columns: &Columns) -> usize {
-    6 + columns.stored()
+fn words(columns: &impl Stored) -> usize {
+    6 + columns.words()
 }
 
 /// Bytes of memory that reading takes.
-fn bytes(columns: &Columns, vertices: u64) -> u64 {
+pub(super) fn bytes(columns: &impl Stored, vertices: u64) -> u64 {
     let block = 3 * 4 * (BLOCK * words(columns)) as u64;
     let places = 2 * vertices.div_ceil(PART as u64) * size_of::<Place>() as u64;
     block + places + 4 * (BATCH * size_of::<BlockTriangle>()) as u64 + (4 << 20)
@@ -61,7 +97,14 @@ pub(super) fn read(path: &Path, workspace: &Workspace) -> Result<Intake> {
         workspace
             .observer
             .begin("read mesh", "vertices and faces", total);
-        let mut reader = Reader::new(path, unit, &mesh, columns);
+        let about = About {
+            path,
+            vertices: mesh.vertices(),
+            floats: mesh.has_plain_floats(),
+            columns,
+            names: ["levels.vertices", "levels.triangles"],
+        };
+        let mut reader = Reader::new(about, unit);
         let mesh = mesh.wanting(reader.intake.columns.wanted());
         mesh.read_in_place(&mut reader)?;
         let intake = reader.finish()?;
@@ -70,10 +113,11 @@ pub(super) fn read(path: &Path, workspace: &Workspace) -> Result<Intake> {
     })
 }
 
-struct Reader<'a> {
+/// Takes a mesh, slice by slice.
+pub(super) struct Reader<'a, C> {
     path: &'a Path,
     unit: &'a Unit<'a>,
-    intake: Intake,
+    intake: Intake<C>,
     finder: Finder,
     /// Positions whose values are to come.
     positions: Vec<[f64; 3]>,
@@ -84,22 +128,23 @@ struct Reader<'a> {
     senders: usize,
 }
 
-impl<'a> Reader<'a> {
-    fn new(path: &'a Path, unit: &'a Unit<'a>, mesh: &PlyMesh, columns: Columns) -> Self {
-        let blocks = mesh.vertices().div_ceil(BLOCK as u64) as usize;
+impl<'a, C: Stored> Reader<'a, C> {
+    pub fn new(about: About<'a, C>, unit: &'a Unit<'a>) -> Self {
+        let blocks = about.vertices.div_ceil(BLOCK as u64) as usize;
+        let [vertices, triangles] = about.names;
         Self {
-            path,
+            path: about.path,
             unit,
             intake: Intake {
-                vertices: mesh.vertices(),
+                vertices: about.vertices,
                 triangles: 0,
                 lattice: Finder::default().finish(),
-                columns,
+                columns: about.columns,
                 parts: Vec::new(),
-                table: Table::new("levels.vertices", blocks),
-                sent: Shuffle::new("levels.triangles"),
+                table: Table::new(vertices, blocks),
+                sent: Shuffle::new(triangles),
             },
-            finder: match mesh.has_plain_floats() {
+            finder: match about.floats {
                 true => Finder::of_floats(),
                 false => Finder::default(),
             },
@@ -112,7 +157,7 @@ impl<'a> Reader<'a> {
     }
 
     fn store(&mut self, values: &[f64]) -> Result<()> {
-        let each = self.intake.columns.wanted().len();
+        let each = self.intake.columns.values();
         let words = words(&self.intake.columns);
         for number in 0..self.positions.len() {
             let position = self.positions[number];
@@ -166,7 +211,8 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    fn finish(mut self) -> Result<Intake> {
+    /// Ends the reading.
+    pub fn finish(mut self) -> Result<Intake<C>> {
         if !self.block.is_empty() {
             self.write()?;
         }
@@ -176,12 +222,12 @@ impl<'a> Reader<'a> {
     }
 }
 
-impl Sink for Reader<'_> {
+impl<C: Stored> Sink for Reader<'_, C> {
     fn vertices(&mut self, positions: &[[f64; 3]]) -> Result<()> {
         self.positions.extend_from_slice(positions);
-        match self.intake.columns.wanted().is_empty() {
-            true => self.store(&[]),
-            false => Ok(()),
+        match self.intake.columns.values() {
+            0 => self.store(&[]),
+            _ => Ok(()),
         }
     }
 
@@ -225,13 +271,15 @@ impl Sink for Reader<'_> {
 
 /// A vertex as it was read.
 pub(super) struct Vertex<'a> {
+    /// Its position.
+    pub position: [f64; 3],
     /// Its place on the lattice.
     pub point: [u32; 3],
     /// Its other words.
     pub stored: &'a [u32],
 }
 
-impl Intake {
+impl<C: Stored> Intake<C> {
     /// Number of blocks.
     pub fn blocks(&self) -> usize {
         self.vertices.div_ceil(BLOCK as u64) as usize
@@ -259,6 +307,7 @@ impl Intake {
                 f64::from_bits(half(0) | half(1) << 32)
             });
             each(Vertex {
+                position,
                 point: self.lattice.index(position),
                 stored: &vertex[6..],
             });

@@ -3,7 +3,8 @@
 //! The triangles are divided into the cells of an octree (`cells`), which are the leaves of the tree (`tree`).
 //! Every other tile is made from its children: they are joined, simplified (`simplify`) and measured against the
 //! joined surface (`distance`). A vertex that has triangles outside of the tile is not removed, so that tiles of
-//! any two levels meet without a crack. `docs/tiles.md` describes the files.
+//! any two levels meet without a crack. `docs/tiles.md` describes the files. `single` makes one mesh with fewer
+//! triangles instead, from the same cells.
 
 mod cells;
 mod columns;
@@ -22,12 +23,14 @@ mod report;
 mod rows;
 mod shared;
 mod simplify;
+pub mod single;
 mod system;
 mod tree;
 
 pub use report::{Options, TilesReport};
 pub use simplify::{Manner, Quadrics, Simplifier, Surface};
 
+use cells::Division;
 use folder::About;
 pub use folder::{NAME, check_folder, remove_unfinished};
 use geo::Globe;
@@ -99,7 +102,14 @@ fn make(
     };
     // Without the first, which is over.
     plan(&outlook::all(intake.triangles, workspace.threads)[1..]);
-    let cells = cells::divide(&intake, options.most_triangles, workspace)?;
+    let division = Division {
+        most: options.most_triangles,
+        thirds: 0,
+        step: "cells".into(),
+        placed: "levels.placed".into(),
+        cells: "levels.cells".into(),
+    };
+    let cells = cells::divide(&intake, &division, workspace)?;
     intake.sent.release(workspace)?;
     workspace.trim();
     let observer = &workspace.observer;

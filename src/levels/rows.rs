@@ -121,3 +121,39 @@ row! {
     }
     packed Above Above Left
 }
+
+row! {
+    /// A vertex that one cell keeps when its triangles are simplified, sent to the block of its old number.
+    pub struct KeptVertex {
+        /// The block.
+        block: u32,
+        /// Its old number.
+        vertex: u32,
+        /// The cell.
+        cell: u32,
+        /// Zero.
+        unused: u32,
+        /// Its position.
+        position: [f64; 3],
+        /// The part of its quadric that the cell knows (src/levels/single/quadric.rs).
+        quadric: [f64; 11],
+    }
+    unpacked
+}
+
+row! {
+    /// A value of such a vertex.
+    pub struct KeptValue {
+        /// The block.
+        block: u32,
+        /// The old number of the vertex.
+        vertex: u32,
+        /// The cell.
+        cell: u32,
+        /// The column.
+        column: u32,
+        /// The value.
+        value: f64,
+    }
+    unpacked
+}

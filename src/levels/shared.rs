@@ -3,7 +3,7 @@
 
 use super::cells::Cells;
 use super::columns::octahedral;
-use super::intake::{BLOCK, Intake};
+use super::intake::{BLOCK, Intake, Stored};
 use super::node::{Bounds, INNER, Node, open_edges};
 use super::rows::{
     CellEdge, CellTriangle, CellVertex, PartNormal, SeamEdge, SharedVertex, WholeNormal,
@@ -15,6 +15,9 @@ use outcrop_disk::workspace::{Unit, Workspace};
 
 /// Bytes of memory for a triangle of a cell while its node is made.
 const EACH: u64 = 220;
+
+/// Bytes of memory for a triangle of a cell while its vertices are listed.
+const SHARE_EACH: u64 = 96;
 
 /// Receives what the blocks tell the cells.
 pub(super) struct Shared<'a> {
@@ -42,7 +45,7 @@ pub(super) fn bytes(intake: &Intake, triangles: u32) -> u64 {
 }
 
 /// The numbers of the vertices of a cell, ascending, and its triangles as indices in that list.
-fn local(rows: &[CellTriangle]) -> (Vec<u32>, Vec<[u32; 3]>) {
+pub(super) fn local(rows: &[CellTriangle]) -> (Vec<u32>, Vec<[u32; 3]>) {
     let mut corners: Vec<u64> = Vec::with_capacity(3 * rows.len());
     for (number, row) in rows.iter().enumerate() {
         let numbered = row.corners.iter().zip(3 * number..);
@@ -83,10 +86,17 @@ fn radsort(all: &mut Vec<u64>) {
     }
 }
 
-/// The vertices of cells go to their blocks; the blocks tell which have several cells.
-fn share_vertices(intake: &Intake, cells: &Cells, workspace: &Workspace) -> Result<()> {
-    let (list, sent) = (&cells.cells, Shuffle::<CellVertex>::new(VERTICES));
-    let bytes_of = |n: usize| bytes(intake, list[n].triangles);
+/// The vertices of cells go to their blocks; the blocks tell which have several cells, with the word that `tell`
+/// makes of the cells of a vertex. `names` are those of the two shuffles; `ending` ends the names of the steps.
+pub(super) fn share_vertices<C: Stored + Sync>(
+    intake: &Intake<C>,
+    cells: &Cells,
+    (names, ending): ([&str; 2], &str),
+    tell: impl Fn(&[CellVertex]) -> u32 + Sync,
+    workspace: &Workspace,
+) -> Result<()> {
+    let (list, sent) = (&cells.cells, Shuffle::<CellVertex>::new(names[0]));
+    let bytes_of = |n: usize| u64::from(list[n].triangles) * SHARE_EACH + (1 << 20);
     let work = |unit: &Unit<'_>| {
         let cell = unit.number();
         let mut ids = Vec::new();
@@ -108,24 +118,23 @@ fn share_vertices(intake: &Intake, cells: &Cells, workspace: &Workspace) -> Resu
         sent.send(unit, cell, rows.collect())
     };
     workspace.units(
-        ("vertices of cells", "levels: cells"),
+        (format!("vertices of cells{ending}"), "levels: cells"),
         list.len(),
         bytes_of,
         work,
         |_, ()| Ok(()),
     )?;
     let inbox = sent.open(workspace, intake.blocks())?;
-    let shared = Shuffle::<SharedVertex>::new(SHARED);
+    let shared = Shuffle::<SharedVertex>::new(names[1]);
     let bytes_of = |block: usize| 48 * inbox.rows(block) as u64 + (1 << 20);
     let work = |unit: &Unit<'_>| {
         let rows = inbox.get(unit, unit.number())?;
         let mut told = Vec::new();
         for same in rows.chunk_by(|a, b| a.vertex == b.vertex) {
-            let [first, .., last] = same else {
+            if same.len() < 2 {
                 continue;
-            };
-            let [a, b] = [first, last].map(|row| &list[row.cell as usize]);
-            let depth = common_depth(a, b);
+            }
+            let depth = tell(same);
             told.extend(same.iter().map(|row| SharedVertex {
                 cell: row.cell,
                 vertex: row.vertex,
@@ -134,7 +143,7 @@ fn share_vertices(intake: &Intake, cells: &Cells, workspace: &Workspace) -> Resu
         }
         shared.send(unit, unit.number(), told)
     };
-    let name = ("shared vertices", "levels: blocks");
+    let name = (format!("shared vertices{ending}"), "levels: blocks");
     workspace.units(name, intake.blocks(), bytes_of, work, |_, ()| Ok(()))?;
     sent.release(workspace)
 }
@@ -246,7 +255,12 @@ fn share_edges(shared: &Shared<'_>, workspace: &Workspace) -> Result<Vec<Bounds>
 impl<'a> Shared<'a> {
     /// Finds what the cells have in common.
     pub fn find(intake: &'a Intake, cells: &'a Cells, workspace: &Workspace) -> Result<Self> {
-        share_vertices(intake, cells, workspace)?;
+        let depth = |same: &[CellVertex]| {
+            let ends = [same[0], same[same.len() - 1]];
+            let [a, b] = ends.map(|row| &cells.cells[row.cell as usize]);
+            common_depth(a, b)
+        };
+        share_vertices(intake, cells, ([VERTICES, SHARED], ""), depth, workspace)?;
         let count = cells.cells.len();
         let mut shared = Self {
             intake,

@@ -1,16 +1,13 @@
 //! A run that makes a tileset, and that can be resumed.
 
+use super::mesh_job::MeshJob;
 use super::resources::{Resources, resource_setters};
 use super::{Start, start::scratch_folder};
-use outcrop_disk::error::{Error, Result};
-use outcrop_disk::workspace::memory::MemoryPool;
+use outcrop_disk::error::Result;
 use outcrop_disk::workspace::progress::{Cancel, Observer};
-use outcrop_disk::workspace::{Folder, Found, Storage, Workspace, fault};
+use outcrop_disk::workspace::{Storage, Workspace};
 use outcrop_levels::{Options, TilesReport};
-use serde::{Deserialize, Serialize};
-use std::fs::File;
-use std::os::unix::fs::{FileExt, MetadataExt};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 /// The version of what a resumed run reads.
@@ -22,74 +19,6 @@ pub struct Tiles {
     folder: PathBuf,
     options: Options,
     resources: Resources,
-}
-
-/// Mesh and options of a run, by which it is resumed.
-#[derive(Debug, PartialEq, Serialize, Deserialize)]
-struct Manifest {
-    format: String,
-    version: String,
-    mesh: PathBuf,
-    output: PathBuf,
-    options: Options,
-    bytes: u64,
-    modified: (i64, i64),
-    sample: u32,
-}
-
-/// Bytes at each end of the mesh by which another content is noticed.
-const SAMPLE: u64 = 1 << 16;
-
-impl Manifest {
-    fn of(job: &Tiles) -> Result<Self> {
-        let path = &job.mesh;
-        let read = || {
-            let file = File::open(path)?;
-            let about = file.metadata()?;
-            let mut crc = crc32fast::Hasher::new();
-            for at in [0, about.len().saturating_sub(SAMPLE)] {
-                let mut bytes = vec![0; (about.len() - at).min(SAMPLE) as usize];
-                file.read_exact_at(&mut bytes, at)?;
-                crc.update(&bytes);
-            }
-            Ok((about, crc.finalize()))
-        };
-        let (about, sample) = read().map_err(|e| Error::io(path, "read", e))?;
-        let whole = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
-        Ok(Self {
-            format: FORMAT.into(),
-            version: env!("CARGO_PKG_VERSION").into(),
-            mesh: whole(path),
-            output: whole(&job.folder),
-            options: job.options.clone(),
-            bytes: about.len(),
-            modified: (about.mtime(), about.mtime_nsec()),
-            sample,
-        })
-    }
-
-    fn to_bytes(&self, folder: &Path) -> Result<Vec<u8>> {
-        let json = serde_json::to_vec_pretty(self);
-        json.map_err(|e| Error::io(folder, "write the manifest", e.into()))
-    }
-
-    /// An error if a run that began with `bytes` is another one.
-    fn check(&self, bytes: &[u8], folder: &Path) -> Result<()> {
-        let was: serde_json::Value = serde_json::from_slice(bytes).unwrap_or_default();
-        let now = serde_json::to_value(self).unwrap_or_default();
-        let differing = now
-            .as_object()
-            .and_then(|now| now.iter().find(|(key, value)| was.get(key) != Some(value)));
-        match differing {
-            None => Ok(()),
-            Some((key, value)) => Err(Error::Mismatch {
-                path: folder.to_path_buf(),
-                what: format!("the {key}"),
-                was: was[key].to_string(),
-                now: value.to_string(),
-            }),
-        }
-    }
 }
 
 impl Tiles {
@@ -118,42 +47,6 @@ impl Tiles {
         scratch_folder(&self.folder, self.resources.scratch.as_deref())
     }
 
-    fn open(&self) -> Result<Workspace> {
-        let path = self.scratch_folder();
-        let manifest = Manifest::of(self)?;
-        let bytes = manifest.to_bytes(&path)?;
-        let Resources {
-            observer, cancel, ..
-        } = &self.resources;
-        let found = match self.resources.start {
-            Start::Resume => Folder::find_when_free(&path, &**observer, cancel)?,
-            Start::New | Start::Restart => Folder::find(&path)?,
-        };
-        let folder = match (found, self.resources.start) {
-            (Found::Nothing, _) => Folder::create(&path, bytes)?,
-            (Found::Run(folder), Start::Resume) => {
-                manifest.check(&folder.manifest, &path)?;
-                folder
-            }
-            (Found::Run(_) | Found::Damaged(_), Start::New) if Folder::has_progress(&path) => {
-                return Err(Error::Unfinished { path });
-            }
-            (Found::Run(folder) | Found::Damaged(folder), _) => folder.restart(bytes)?,
-        };
-        let Resources {
-            observer,
-            cancel,
-            storage,
-            ..
-        } = &self.resources;
-        let pool = MemoryPool::new(self.resources.memory())?;
-        let threads = self.resources.threads();
-        let (observer, cancel) = (observer.clone(), cancel.clone());
-        let workspace = Workspace::resumable(folder, pool, threads, observer, cancel)?;
-        workspace.set_storage(*storage)?;
-        Ok(workspace)
-    }
-
     /// Makes the tileset.
     ///
     /// # Errors
@@ -162,17 +55,17 @@ impl Tiles {
     /// [`Error::Cancelled`]; those of an unfinished run, as of [`crate::Reconstruction::run`].
     pub fn run(&self) -> Result<TilesReport> {
         outcrop_levels::check_folder(&self.folder)?;
-        let workspace = self.open()?;
-        let outcome = self.make(&workspace);
-        let path = self.scratch_folder();
-        let keep = outcome.as_ref().is_err_and(Error::can_resume) && Folder::has_progress(&path);
-        if !keep {
-            workspace.remove(outcome.is_ok());
-            outcrop_levels::remove_unfinished(&self.folder);
-        }
-        drop(workspace);
-        fault::finish();
-        outcome
+        let job = MeshJob {
+            format: FORMAT,
+            mesh: &self.mesh,
+            output: &self.folder,
+            options: &self.options,
+            resources: &self.resources,
+        };
+        job.run(
+            |workspace| self.make(workspace),
+            || outcrop_levels::remove_unfinished(&self.folder),
+        )
     }
 
     fn make(&self, workspace: &Workspace) -> Result<TilesReport> {
