@@ -1,9 +1,9 @@
 //! Normals that points bring: directions for the disks, and the outer side.
 
-use crate::scanners::run;
-use crate::scanners::{Mesh, read};
+use crate::scanners::{read, run};
 use crate::util::{self, Bench};
 use outcrop::params::{InputNormals, Params};
+use outcrop_ply::Mesh;
 use std::fmt::Write;
 
 /// A point with its true normal.

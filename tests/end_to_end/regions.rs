@@ -1,5 +1,6 @@
 //! `--crop` and `--split`: what is written is the part of the whole mesh that the rules name.
 
+use crate::scanners::read;
 use crate::util::{self, Bench};
 use outcrop::params::{Params, Region};
 use outcrop::report::Report;
@@ -23,11 +24,6 @@ fn triangles(mesh: &Mesh) -> Vec<[Corner; 3]> {
     let mut all: Vec<_> = mesh.triangles.iter().map(from_smallest).collect();
     all.sort_unstable();
     all
-}
-
-fn read(path: &Path) -> Mesh {
-    let bytes = std::fs::read(path).unwrap();
-    Mesh::read(&bytes[..], bytes.len() as u64).unwrap()
 }
 
 /// Points all through a box: open boundaries, pinched vertices, many blocks.

@@ -3,38 +3,14 @@
 use crate::util::{self, Bench};
 use outcrop::Report;
 use outcrop::params::Params;
-use outcrop_codecs::ply_mesh::{PlyMesh, Sink};
+use outcrop_ply::Mesh;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// A mesh in memory.
-#[derive(Default)]
-pub struct Mesh {
-    pub vertices: Vec<[f64; 3]>,
-    pub triangles: Vec<[u32; 3]>,
-}
-
-impl Sink for Mesh {
-    fn vertices(&mut self, positions: &[[f64; 3]]) -> outcrop::Result<()> {
-        self.vertices.extend_from_slice(positions);
-        Ok(())
-    }
-
-    fn triangles(&mut self, triangles: &[[u32; 3]]) -> outcrop::Result<()> {
-        self.triangles.extend_from_slice(triangles);
-        Ok(())
-    }
-
-    fn non_triangles(&mut self, _: u64) -> outcrop::Result<()> {
-        Ok(())
-    }
-}
-
 /// Reads a mesh.
 pub fn read(mesh: &Path) -> Mesh {
-    let mut all = Mesh::default();
-    PlyMesh::open(mesh).unwrap().read(&mut all).unwrap();
-    all
+    let file = std::fs::read(mesh).unwrap();
+    Mesh::read(&file[..], file.len() as u64).unwrap()
 }
 
 /// True if a triangle faces a place.

@@ -7,11 +7,11 @@ use crate::reference::clouds::Random;
 use crate::reference::outside::{Facing, Known};
 use crate::reference::{Counts, Settings, cells, connect};
 use outcrop::{Division, Error};
-use outcrop_codecs::ply_mesh::{PlyMesh, Sink};
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
 use outcrop_disk::workspace::progress::{Cancel, Silent};
 use outcrop_mesh_files::export::{CoordinateType, ExportOptions, export};
+use outcrop_ply::Mesh;
 use outcrop_stages::attributes::StoredScanners;
 use outcrop_stages::blocks::Blocks;
 use outcrop_stages::cells::CountedTriple;
@@ -31,24 +31,6 @@ type Point = [i32; 3];
 
 /// One sheet in this number is large.
 const LARGE: u64 = 40;
-
-#[derive(Default)]
-struct Faces(Vec<[u32; 3]>);
-
-impl Sink for Faces {
-    fn vertices(&mut self, _: &[[f64; 3]]) -> outcrop::Result<()> {
-        Ok(())
-    }
-
-    fn triangles(&mut self, triangles: &[[u32; 3]]) -> outcrop::Result<()> {
-        self.0.extend_from_slice(triangles);
-        Ok(())
-    }
-
-    fn non_triangles(&mut self, _: u64) -> outcrop::Result<()> {
-        Ok(())
-    }
-}
 
 fn workspace() -> Workspace {
     let memory = MemoryPool::new(MINIMUM_BUDGET).unwrap();
@@ -162,8 +144,8 @@ fn pipeline(
     let path = folder.path().join("mesh.ply");
     let to = ExportOptions::new(&path, CoordinateType::Double);
     export(&store, &repaired, blocks, &lattice, to, workspace)?;
-    let mut faces = Faces::default();
-    PlyMesh::open(&path)?.read(&mut faces)?;
+    let file = std::fs::read(&path).unwrap();
+    let mesh = Mesh::read(&file[..], file.len() as u64).unwrap();
     let counts = [
         base.flagged,
         base.unfit,
@@ -173,7 +155,7 @@ fn pipeline(
         mended.holes_filled,
         mended.hole_triangles,
     ];
-    Ok((faces.0, counts))
+    Ok((mesh.triangles, counts))
 }
 
 fn counted(c: &Counts) -> [u64; 7] {

@@ -6,34 +6,9 @@ use outcrop::{
     Division, Error, Facing, InputNormals, MaxWidth, Method, Params, Radius, Reconstruction,
     Report, Smooth, Smoothing,
 };
-use outcrop_codecs::ply_mesh::{PlyMesh, Sink};
-use std::path::Path;
+use outcrop_ply::Mesh as ReadBack;
 
 type Point = [i32; 3];
-
-/// A mesh read from a file: positions in lattice steps.
-#[derive(Default)]
-pub struct ReadBack {
-    vertices: Vec<[f64; 3]>,
-    triangles: Vec<[u32; 3]>,
-}
-
-impl Sink for ReadBack {
-    fn vertices(&mut self, positions: &[[f64; 3]]) -> outcrop::Result<()> {
-        self.vertices.extend_from_slice(positions);
-        Ok(())
-    }
-
-    fn triangles(&mut self, triangles: &[[u32; 3]]) -> outcrop::Result<()> {
-        self.triangles.extend_from_slice(triangles);
-        Ok(())
-    }
-
-    fn non_triangles(&mut self, count: u64) -> outcrop::Result<()> {
-        assert_eq!(count, 0);
-        Ok(())
-    }
-}
 
 /// The division of the work; it must not affect the mesh.
 #[derive(Debug, Clone, Copy)]
@@ -136,8 +111,8 @@ pub fn pipeline(
         .page_points(cut.page)
         .build()?
         .run()?;
-    let mut mesh = ReadBack::default();
-    PlyMesh::open(Path::new(&output))?.read(&mut mesh)?;
+    let file = std::fs::read(&output).unwrap();
+    let mesh = ReadBack::read(&file[..], file.len() as u64).unwrap();
     Ok((mesh, report))
 }
 
