@@ -105,13 +105,18 @@ pub(crate) struct Text {
 }
 
 impl Text {
-    /// The coordinates of ordered points of a cloud whose lattice is `own`. Without smoothing the vertices are
-    /// points of the cloud, and need no finer lattice than they have.
-    pub fn of(own: &Lattice, lattice: &Lattice, params: &Params, points: &StoredPoints) -> Self {
+    /// The number of decimals for a cloud whose lattice is `own`. Without smoothing the vertices are points of
+    /// the cloud, and need no finer lattice than they have.
+    pub fn decimals(own: &Lattice, lattice: &Lattice, params: &Params) -> usize {
         let finer = params.smooth != Smooth::Rounds(0) || !own.exact;
+        export::decimals(if finer { lattice } else { own })
+    }
+
+    /// The coordinates of ordered points, with so many decimals.
+    pub fn of(decimals: usize, lattice: &Lattice, points: &StoredPoints) -> Self {
         let Aabb { min, max } = points.bounds();
         Self {
-            decimals: export::decimals(if finer { lattice } else { own }),
+            decimals,
             bounds: [min, max].map(|corner| lattice.position(corner)),
         }
     }

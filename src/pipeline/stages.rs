@@ -68,6 +68,8 @@ pub(super) struct Stages<'a> {
     report: Report,
     /// Step of the lattice before it was refined.
     coarse: f64,
+    /// Decimals of coordinates as text.
+    decimals: usize,
     /// Well-known text of the reference system.
     wkt: Option<String>,
     /// The course of the attempt, if the report shows it.
@@ -96,6 +98,7 @@ impl<'a> Stages<'a> {
             known: headers.unwrap_or_default(),
             carried: Carried::default(),
             coarse: 0.0,
+            decimals: 0,
             wkt: None,
             course: (job.pictures && !workspace.is_shared())
                 .then(|| Course::start(job.memory.clone(), workspace.io.clone())),
@@ -200,7 +203,9 @@ impl<'a> Stages<'a> {
         self.check_room()?;
         let moves = params.smooth.rounds() + params.relax > 0;
         let lattice = spool.choose_lattice(if moves { HALVINGS } else { 0 })?;
-        self.coarse = spool.choose_lattice(0)?.step;
+        let own = spool.choose_lattice(0)?;
+        self.coarse = own.step;
+        self.decimals = Text::decimals(&own, &lattice, params);
         self.check_origin(&lattice)?;
         self.check_facing(&lattice)?;
         self.report.lattice = LatticeReport {
@@ -220,7 +225,6 @@ impl<'a> Stages<'a> {
         let (job, workspace) = (self.job, self.workspace);
         let (points, page) = (spool.points(), job.page_points);
         let grid = job.params.thin.and_then(|side| Grid::new(lattice, side));
-        let own = spool.choose_lattice(0)?;
         let (store, spool) = if let Some(grid) = grid {
             let (thinned, spool) = self.clock.stage("thin", "points", points, || {
                 thin(spool, lattice, grid, workspace)
@@ -248,7 +252,7 @@ impl<'a> Stages<'a> {
             self.report.duplicates_folded = folded;
             (store, spool)
         };
-        let text = Text::of(&own, lattice, &job.params, &store);
+        let text = Text::of(self.decimals, lattice, &store);
         self.warn_of_duplicates(spool.as_ref(), lattice)?;
         let again = !self.carried.is_empty();
         let spool = spool.map_or(Ok(None), |spool| spool.kept_if(again, workspace))?;
