@@ -264,17 +264,21 @@ fn sample(store: &PointStore, workspace: &Workspace) -> Result<Sample> {
                     let radius = METHOD.disk.reach * (last.distance2 as f64).sqrt();
                     sample.radius.push(radius);
                 }
+                let fit = match fit_in_tile(&mut query, neighbors, Widen::OnBands) {
+                    Ok(Some(fit)) => fit,
+                    Ok(None) => return,
+                    Err(error) => {
+                        failed = Some(error);
+                        return;
+                    }
+                };
                 let measured = Instant::now();
-                let fit = fit_in_tile(&mut query, neighbors, Widen::OnBands);
-                if let Ok(Some(fit)) = fit
-                    && let Some((noise, noisy)) = gauge.noise(query.near(), &fit, neighbors)
-                {
+                if let Some((noise, noisy)) = gauge.noise(query.near(), &fit, neighbors) {
                     sample.noise.push(noise);
                     sample.noisy += usize::from(noisy);
                 }
                 besides += measured.elapsed();
-                let made = maker.from_tile(&mut query, |_, _| {});
-                failed = made.err().or(failed.take());
+                maker.from_fit(&mut query, &fit, |_, _| {});
             },
         );
         sample.seconds += begin.elapsed().saturating_sub(besides).as_secs_f64();

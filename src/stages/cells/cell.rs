@@ -2,10 +2,12 @@
 //! 3.4).
 
 use super::directions::{Directions, DiskStats};
-use crate::ids::Id;
+use super::fit::{Fit, Widen, fit_from};
+use crate::ids::{Id, Ids};
+use crate::levels::Levels;
 use crate::order::PointStore;
 use crate::spacing::{Density, Nearby, Standing};
-use crate::tiles::near::{Query, Sums};
+use crate::tiles::near::Query;
 use crate::tiles::neighbors::Neighbors;
 use crate::tiles::walk::{PageCache, Walk};
 use crate::tiles::wanted::Wanted;
@@ -14,9 +16,8 @@ use outcrop_geom::Point;
 use outcrop_geom::aabb::Aabb;
 use outcrop_geom::clip::wrap::Wrapper;
 use outcrop_geom::clip::{Cell, Spheres};
-use outcrop_geom::kernels::Level;
 use outcrop_geom::method::METHOD;
-use outcrop_geom::plane::{Moments, Normal, Plane};
+use outcrop_geom::plane::Normal;
 use std::cell::OnceCell;
 
 /// The radius of the disk.
@@ -41,129 +42,22 @@ pub enum Outcome {
     OffSurface,
 }
 
-/// A source of the neighbours of a point.
-trait Source {
-    /// The neighbours found so far, nearest first.
-    fn near(&self) -> &Neighbors;
-    /// Finds `count` neighbours, or all other points if there are fewer; false if they cannot be certified.
-    fn reach(&mut self, count: usize) -> Result<bool>;
-    /// The sums over the `count` nearest neighbours, or over all other points if there are fewer, and the
-    /// number of points summed; `None` if they cannot be certified.
-    fn sums(&mut self, count: usize) -> Result<Option<(Sums, usize)>>;
+/// How coarse points are, as [`coarseness`](crate::spacing::coarseness).
+#[derive(Debug, Default)]
+struct Coarse {
+    /// The points that are noted.
+    ids: Ids,
+    /// By place; empty as long as none is coarse.
+    levels: Levels,
 }
 
-impl Source for Query<'_> {
-    fn near(&self) -> &Neighbors {
-        Query::near(self)
-    }
-
-    fn reach(&mut self, count: usize) -> Result<bool> {
-        Ok(self.extend_to(count))
-    }
-
-    fn sums(&mut self, count: usize) -> Result<Option<(Sums, usize)>> {
-        Ok(Query::sums(self, count).map(|sums| (sums, count)))
-    }
-}
-
-/// A walk through the whole store, and the neighbours found so far.
-impl Source for (Walk<'_>, Neighbors) {
-    fn near(&self) -> &Neighbors {
-        &self.1
-    }
-
-    fn reach(&mut self, count: usize) -> Result<bool> {
-        let (walk, near) = self;
-        while near.len() < count
-            && let Some(next) = walk.advance()?
-        {
-            near.push(next);
+impl Coarse {
+    fn note(&mut self, id: Id, level: u8) {
+        if self.levels.is_empty() {
+            self.levels = Levels::new(self.ids.len());
         }
-        Ok(true)
-    }
-
-    fn sums(&mut self, count: usize) -> Result<Option<(Sums, usize)>> {
-        self.reach(count)?;
-        let used = count.min(self.1.len());
-        Ok(Some((self.1.sums(used, Level::best()), used)))
-    }
-}
-
-/// The plane fitted to a point's neighbours, and the moments it follows from.
-#[derive(Debug, Clone, Copy)]
-pub struct Fit {
-    /// The normal, and whether the neighbours span a plane.
-    pub plane: Plane,
-    /// The sums over the neighbours.
-    pub moments: Moments,
-    /// Squared distance of the last neighbour used.
-    pub last2: u64,
-    /// Squared distance of the last of the requested neighbours, before widening.
-    pub near2: u64,
-}
-
-impl Fit {
-    /// The plane of neighbours given by their sums.
-    #[must_use]
-    pub fn of(sums: Sums) -> Self {
-        Self::with(sums.moments.plane(), sums)
-    }
-
-    /// As [`Fit::of`], if the plane of the sums is known.
-    #[must_use]
-    pub fn with(plane: Plane, sums: Sums) -> Self {
-        Self {
-            plane,
-            moments: sums.moments,
-            last2: sums.last2,
-            near2: sums.last2,
-        }
-    }
-}
-
-fn fit_from(source: &mut impl Source, neighbors: usize, widen: Widen) -> Result<Option<Fit>> {
-    if !source.reach(neighbors)? {
-        return Ok(None);
-    }
-    let mut used = neighbors.min(source.near().len());
-    let mut fit = Fit::of(source.near().sums(used, Level::best()));
-    let mut wanted = neighbors;
-    for _ in 0..METHOD.plane.doublings {
-        if widen.is_enough(&fit.plane) || used < wanted {
-            break;
-        }
-        // Only the set of neighbours matters here, not yet their order.
-        wanted *= 2;
-        let Some((sums, count)) = source.sums(wanted)? else {
-            return Ok(None);
-        };
-        used = count;
-        fit = Fit {
-            near2: fit.near2,
-            ..Fit::of(sums)
-        };
-    }
-    Ok(Some(fit))
-}
-
-/// When the fit of a plane doubles the number of neighbours, up to eight times the requested one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Widen {
-    /// Never: exactly the requested neighbours.
-    Never,
-    /// While the neighbours lie on a line.
-    OnLines,
-    /// While the neighbours lie on a narrow band, such as two scan lines.
-    OnBands,
-}
-
-impl Widen {
-    /// True if a plane needs no more neighbours.
-    pub(super) fn is_enough(self, plane: &Plane) -> bool {
-        match self {
-            Self::Never => true,
-            Self::OnLines => plane.spans,
-            Self::OnBands => plane.wide,
+        if self.ids.contains(&id) {
+            self.levels.set(self.ids.place(id), level);
         }
     }
 }
@@ -176,8 +70,8 @@ pub struct CellMaker<'a> {
     pub(super) widen: Widen,
     /// If given, points off the surface get no cell.
     density: Option<Density<'a>>,
-    /// The points that are coarser than their patch, with their numbers.
-    pub(super) coarse: Vec<(Id, u8)>,
+    /// How coarse the points of its tile are.
+    coarse: Coarse,
     /// The normals of the points, if they bring any.
     directions: Option<Directions>,
     pub(super) cell: Cell,
@@ -198,11 +92,21 @@ impl<'a> CellMaker<'a> {
             radius,
             widen,
             density,
-            coarse: Vec::new(),
+            coarse: Coarse::default(),
             directions: None,
             cell: Cell::new(0, [0, 0, 1 << 24], 1.0),
             wrapper: Box::default(),
         }
+    }
+
+    /// Notes how coarse the points of a tile are, which takes [`Levels::size`] bytes.
+    pub(super) fn note_coarse(&mut self, ids: Ids) {
+        self.coarse.ids = ids;
+    }
+
+    /// How coarse the points of the tile are, by place; empty if none is.
+    pub(super) fn coarse(self) -> Levels {
+        self.coarse.levels
     }
 
     /// Takes the directions of disks from the normals of the points, too.
@@ -233,7 +137,7 @@ impl<'a> CellMaker<'a> {
         if let (Some(density), Some(_)) = (self.density, estimated) {
             match density.standing(id, fit.near2, &fit.moments, near) {
                 Standing::Off => return Err(Outcome::OffSurface),
-                Standing::Coarse(level) => self.coarse.push((id, level)),
+                Standing::Coarse(level) => self.coarse.note(id, level),
                 Standing::Usual => {}
             }
         }
@@ -267,13 +171,21 @@ impl<'a> CellMaker<'a> {
         query: &mut Query<'_>,
         each: impl FnMut(u32, u32),
     ) -> Result<Outcome> {
-        let Some(fit) = fit_from(query, self.neighbors, self.widen)? else {
-            return Ok(Outcome::Uncertain);
-        };
-        if let Err(outcome) = self.start(Id::new(query.id()), &fit, query.near()) {
-            return Ok(outcome);
+        let fit = fit_from(query, self.neighbors, self.widen)?;
+        Ok(fit.map_or(Outcome::Uncertain, |fit| self.from_fit(query, &fit, each)))
+    }
+
+    /// As [`CellMaker::from_tile`], if the plane is known.
+    pub fn from_fit(
+        &mut self,
+        query: &mut Query<'_>,
+        fit: &Fit,
+        each: impl FnMut(u32, u32),
+    ) -> Outcome {
+        match self.start(Id::new(query.id()), fit, query.near()) {
+            Ok(()) => self.clip(query, each),
+            Err(outcome) => outcome,
         }
-        Ok(self.clip(query, each))
     }
 
     /// Clips the cell by the points that a query lists, and by farther ones, until it is complete.
@@ -348,63 +260,4 @@ impl Wanted for Touching<'_> {
     fn pick(&self, columns: [&[i32]; 3], places: &mut Vec<u32>) {
         self.cell.touching(columns, self.own, places);
     }
-}
-
-/// The plane of the `neighbors` nearest, from the points in a tile and its halo; `None` if they cannot be
-/// certified.
-///
-/// # Errors
-/// None today; see `fit_in_store`.
-pub fn fit_in_tile(query: &mut Query<'_>, neighbors: usize, widen: Widen) -> Result<Option<Fit>> {
-    fit_from(query, neighbors, widen)
-}
-
-/// As [`fit_in_tile`], from the whole store.
-///
-/// # Errors
-/// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
-pub fn fit_in_store(
-    store: &PointStore,
-    cache: &mut PageCache,
-    id: u32,
-    point: Point,
-    neighbors: usize,
-    widen: Widen,
-) -> Result<Option<Fit>> {
-    let mut source = (Walk::new(store, cache, id, point), Neighbors::default());
-    fit_from(&mut source, neighbors, widen)
-}
-
-/// As [`fit_in_store`], with the neighbours, nearest first: at least the `least` nearest.
-///
-/// # Errors
-/// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
-pub fn fit_and_near_in_store(
-    store: &PointStore,
-    cache: &mut PageCache,
-    id: u32,
-    point: Point,
-    (neighbors, least): (usize, usize),
-    widen: Widen,
-) -> Result<Option<(Fit, Neighbors)>> {
-    let mut source = (Walk::new(store, cache, id, point), Neighbors::default());
-    let fit = fit_from(&mut source, neighbors, widen)?;
-    source.reach(least)?;
-    Ok(fit.map(|fit| (fit, source.1)))
-}
-
-/// The `count` nearest neighbours of a point, or all other points if there are fewer, from the whole store.
-///
-/// # Errors
-/// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
-pub fn near_in_store(
-    store: &PointStore,
-    cache: &mut PageCache,
-    id: u32,
-    point: Point,
-    count: usize,
-) -> Result<Neighbors> {
-    let mut source = (Walk::new(store, cache, id, point), Neighbors::default());
-    source.reach(count)?;
-    Ok(source.1)
 }

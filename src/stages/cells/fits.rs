@@ -1,6 +1,6 @@
 //! The planes and neighbours of the points of a tile, for stages other than this one.
 
-use super::cell::{Fit, Widen, fit_and_near_in_store, fit_in_store, fit_in_tile, near_in_store};
+use super::fit::{Fit, Widen, fit_in_store, fit_in_tile, near_in_store};
 use crate::order::PointStore;
 use crate::tiles::Tile;
 use crate::tiles::near::{Around, Query, Search, Sums};
@@ -88,7 +88,8 @@ impl<'a> Planes<'a> {
                 .for_some_queries(count, search, wanted, grown, look);
         };
         let in_store = |cache: &mut PageCache, id: u32, point: Point| {
-            fit_in_store(self.store, cache, id, point, count, widen)
+            let known = fit_in_store(self.store, cache, id, point, (count, 0), widen)?;
+            Ok(known.map(|(fit, _)| fit))
         };
         look(self.unit, in_tile, in_store, each)
     }
@@ -124,7 +125,7 @@ impl<'a> Planes<'a> {
         };
         let in_store = |cache: &mut PageCache, id: u32, point: Point| {
             let counts = (count, least);
-            let known = fit_and_near_in_store(self.store, cache, id, point, counts, widen)?;
+            let known = fit_in_store(self.store, cache, id, point, counts, widen)?;
             Ok(known.map(|(fit, near)| (of.borrow_mut())(id, &fit, &near)))
         };
         look(self.unit, in_tile, in_store, each)

@@ -2,13 +2,14 @@
 
 mod cell;
 mod directions;
+mod fit;
 mod fits;
 mod fold;
 mod together;
 
-pub use cell::fit_in_tile;
-pub use cell::{CellMaker, DiskRadius, Fit, Outcome, Widen};
+pub use cell::{CellMaker, DiskRadius, Outcome};
 pub use directions::{DiskStats, InputDirections};
+pub use fit::{Fit, Widen, fit_in_tile};
 pub(crate) use fits::{Planes, each_around};
 pub use fits::{each_neighborhood, each_plane};
 
@@ -182,7 +183,11 @@ pub fn cells(
     let bytes = |tile: usize| {
         let points = tiles.ids(tile).len();
         let given = options.directions.map_or(0, |d| d.bytes(points));
-        Tile::estimate(points) + PageCache::estimate(store) + TileTriples::estimate(points) + given
+        Tile::estimate(points)
+            + PageCache::estimate(store)
+            + TileTriples::estimate(points)
+            + given
+            + Levels::size(points)
     };
     let work = |unit: &Unit<'_>| {
         let tile = unit.number();
@@ -193,8 +198,9 @@ pub fn cells(
         let of_directions = unit.hold(of_directions);
         let (mut stats, mut no_cell) = one_tile(unit, store, ids.clone(), &mut maker, &mut seen)?;
         let (_, disks) = maker.of_directions();
-        let coarse = by_place(&maker.coarse, &ids);
-        drop((maker, of_directions));
+        let coarse = maker.coarse();
+        let _of_coarse = unit.hold(coarse.bytes());
+        drop(of_directions);
         no_cell.sort_unstable();
         off.put(unit, tile, &no_cell)?;
         stats.raw_triples = seen.len() as u64;
@@ -249,15 +255,6 @@ pub fn cells(
 /// What a unit notes besides its triples: counts, and how coarse its points are; empty if none is.
 type Noted = (CellStats, DiskStats, Levels);
 
-/// The numbers of the coarse points among `ids`, by place; empty if there is none.
-fn by_place(coarse: &[(Id, u8)], ids: &Range<usize>) -> Levels {
-    let mut levels = Levels::new(if coarse.is_empty() { 0 } else { ids.len() });
-    for (id, level) in coarse {
-        levels.set(id.index() - ids.start, *level);
-    }
-    levels
-}
-
 /// What makes the cells of a tile.
 fn maker<'a>(
     unit: &Unit<'_>,
@@ -272,6 +269,7 @@ fn maker<'a>(
         directions,
     } = options;
     let mut maker = CellMaker::new(neighbors, radius, widen, density);
+    maker.note_coarse(Ids::at(ids));
     if let Some(InputDirections { normals, wanted }) = directions {
         let given = normals.open(unit, Ids::at(ids))?;
         maker.set_directions(Directions::new(given, wanted));

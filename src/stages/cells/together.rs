@@ -1,6 +1,7 @@
 //! Cells of the points of a leaf, computed together from their nearest neighbours.
 
-use super::cell::{CellMaker, Fit, Outcome};
+use super::cell::{CellMaker, Outcome};
+use super::fit::Fit;
 use crate::ids::Id;
 use crate::spacing::Nearby;
 use crate::tiles::near::{Group, Neighborhood};
