@@ -14,7 +14,7 @@ const SHORT: [(&str, usize); 2] = [("README.md", 200), ("ARCHITECTURE.md", 200)]
 const WIDTH: usize = 110;
 
 /// Options that documents give to other programs: cargo, scripts and tools.
-const OTHERS: [&str; 11] = [
+const OTHERS: [&str; 12] = [
     "--address",
     "--draft",
     "--features",
@@ -23,6 +23,7 @@ const OTHERS: [&str; 11] = [
     "--kind",
     "--large",
     "--no-default-features",
+    "--quick",
     "--seconds",
     "--strict",
     "--tried",

@@ -9,6 +9,7 @@ mod plan;
 mod shape;
 mod side;
 mod values;
+mod warnings;
 
 use super::checks::{all_are_kept, disk_radius, enough, room};
 use super::disk::{DISTINCT, NORMAL, SCANNER, SURE, Text, displaced};
@@ -16,7 +17,7 @@ use super::{Clock, Known, Reconstruction};
 use crate::params::Method;
 use crate::report::{LatticeReport, Report};
 use export::written;
-use outcrop_disk::error::{Result, Setting};
+use outcrop_disk::error::Result;
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::course::Course;
 use outcrop_geom::lattice::Lattice;
@@ -274,56 +275,6 @@ impl<'a> Stages<'a> {
         }
         self.check_room()?;
         Ok((store, spool))
-    }
-
-    /// Warnings about the points that were read, before anything that may fail because of them.
-    fn warn_of_input(&mut self) {
-        let input = &self.report.input;
-        let warnings = [input.warnings.clone(), self.carried.warnings.clone()];
-        for warning in warnings.concat() {
-            self.warn(warning);
-        }
-    }
-
-    /// Warnings about points that were left out; an error that there are too few left says so itself.
-    fn warn_of_left_out(&mut self) {
-        let left_out = self.report.input.dropped_non_finite;
-        if left_out > 0 {
-            self.warn(format!(
-                "{left_out} points left out: a coordinate is NaN or infinite"
-            ));
-        }
-        let far = (self.report.input.dropped_far, self.report.input.far_example);
-        if let (count, Some([x, y, z])) = far {
-            let option = self.job.observer.spell(&Setting::Flag("keep_far"));
-            self.warn(format!(
-                "{count} points left out, far from all others (one at {x} {y} {z}): with {option} they \
-                 are kept, and all are rounded to coarser steps"
-            ));
-        }
-    }
-
-    /// A warning about many points at the positions of others, if positions are rounded.
-    fn warn_of_duplicates(&mut self, spool: Option<&Spool>, lattice: &Lattice) -> Result<()> {
-        let (folded, kept) = (self.report.duplicates_folded, self.report.input.kept);
-        if lattice.exact || folded <= kept / 100 {
-            return Ok(());
-        }
-        let step = lattice.step;
-        self.warn(match Spool::has_duplicates(spool, lattice, self.workspace)? {
-            Some(true) => {
-                format!("{folded} points are duplicates of others: one at each position is kept")
-            }
-            Some(false) => format!(
-                "{folded} points were merged by rounding: the cloud is so wide that positions had to \
-                 be rounded to steps of {step}; are there outliers far away?"
-            ),
-            None => format!(
-                "{folded} points are at the positions of others, to steps of {step}: duplicates, or points that \
-                 rounding merged because others are far away; one at each position is kept"
-            ),
-        });
-        Ok(())
     }
 
     /// Drops outliers, if requested; the points that stay are divided.

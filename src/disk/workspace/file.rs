@@ -5,11 +5,12 @@
 
 use super::fault::{self, Event};
 use super::keeper::{Kept, Leaving};
-use super::mapped::{Io, Mapping};
+use super::mapped::Mapping;
 use super::memory::{MemoryPool, Reservation};
 use super::open::{failed_write, open_existing, options};
 use super::place::{Place, Put};
 use super::run::ResumableRun;
+use super::storage::Storage;
 use super::{IoCounters, Unit, lock};
 use crate::error::{Error, Result};
 use std::borrow::Cow;
@@ -17,7 +18,6 @@ use std::collections::HashMap;
 use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::path::PathBuf;
-use std::str::FromStr;
 use std::sync::atomic::{AtomicI32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock};
 
@@ -52,40 +52,6 @@ pub(super) const COMPRESSING: u64 = 4 << 20;
 
 /// The level before it is known whether compression pays.
 pub(super) const UNDECIDED: i32 = -1;
-
-/// How files are read and written; it changes no result.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Storage {
-    /// The way in which files are read.
-    pub io: Io,
-    /// The compression of rows.
-    pub compression: Compression,
-}
-
-/// Compression of rows in scratch files with Zstandard.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Compression {
-    /// At level 1 where the disk is not local, or is slower than compression; else none.
-    #[default]
-    Auto,
-    /// None.
-    None,
-    /// At a level of Zstandard, 1 to 3: higher ones take several MiB for each thread to save little.
-    Level(i32),
-}
-
-impl FromStr for Compression {
-    type Err = String;
-
-    fn from_str(text: &str) -> std::result::Result<Self, String> {
-        match (text, text.parse()) {
-            ("auto", _) => Ok(Self::Auto),
-            ("none", _) => Ok(Self::None),
-            (_, Ok(level @ 1..=3)) => Ok(Self::Level(level)),
-            _ => Err(format!("{text:?} is not auto, none or a level from 1 to 3")),
-        }
-    }
-}
 
 impl Shared {
     /// How files are read and written.

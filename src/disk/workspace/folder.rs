@@ -1,5 +1,7 @@
 //! The scratch folder of a run that can be resumed: private and locked.
 
+mod journals;
+
 use super::IoCounters;
 use super::fault::{self, Event};
 use super::history::History;
@@ -12,6 +14,7 @@ use super::progress::{Cancel, Observer};
 use super::recover::{Whereabouts, recover};
 use super::run::{ResumableRun, Role};
 use crate::error::{Error, Remedy, Result};
+use journals::{Ends, read_history, workers};
 use std::collections::HashSet;
 use std::fs::File;
 use std::os::unix::fs::{DirBuilderExt, FileExt, MetadataExt};
@@ -315,48 +318,6 @@ impl Folder {
             found
         })
     }
-}
-
-/// The ends of the journals, and the numbers of records before them.
-struct Ends {
-    program: (u64, u64),
-    /// By worker; none if the file is no journal.
-    workers: Vec<(u32, Option<(u64, u64)>)>,
-}
-
-/// The history in the journals of a folder before time `until`.
-fn read_history(path: &Path, until: u64) -> Result<(History, Ends)> {
-    let mut history = History::default();
-    let mut add = |entry: &journal::Entry<'_>, until: u64| {
-        let valid = entry.at < until;
-        if valid {
-            history.add(entry);
-        }
-        valid
-    };
-    let program = journal::read(&path.join(journal::NAME), None, |entry| add(entry, until))?
-        .unwrap_or_default();
-    // A worker cannot have seen more records than there are.
-    let until = until.min(2 * program.1 + 1);
-    let mut ends = Vec::new();
-    for worker in workers(path)? {
-        let unit = |entry: &journal::Entry<'_>| matches!(entry.record, Record::Unit { .. });
-        let each = |entry: &journal::Entry<'_>| unit(entry) && add(entry, until);
-        let journal = journal::path_of(path, Some(worker));
-        ends.push((worker, journal::read(&journal, Some(worker), each)?));
-    }
-    let workers = ends;
-    Ok((history, Ends { program, workers }))
-}
-
-/// The numbers of the workers that have journals in a folder, ascending.
-fn workers(path: &Path) -> Result<Vec<u32>> {
-    let mut all: Vec<u32> = listing(path)?
-        .iter()
-        .filter_map(|n| journal::worker(n))
-        .collect();
-    all.sort_unstable();
-    Ok(all)
 }
 
 /// The folder with the generations of a run that tasks share.

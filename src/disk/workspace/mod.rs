@@ -3,6 +3,7 @@
 //! The workspace knows neither stages nor rows. Stages obtain memory, files and threads from it.
 
 pub mod compressed;
+mod counters;
 pub mod course;
 mod disk;
 pub mod fault;
@@ -26,16 +27,18 @@ pub mod progress;
 mod recover;
 mod run;
 pub mod steps;
+mod storage;
 mod unit;
 mod units;
 mod wait;
 pub mod zip;
 
-pub use file::{Compression, Storage};
+pub use counters::IoCounters;
 pub use files::Files;
 pub use folder::{Folder, Found};
 pub use names::{OUTPUT, output_of, square_path, temporary};
 pub use recover::RENAMED;
+pub use storage::{Compression, Storage};
 pub use unit::Unit;
 
 use crate::error::{Error, Result};
@@ -48,75 +51,6 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicI32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Instant;
-
-/// Bytes moved and scratch space held, counted where files are read and written.
-#[derive(Debug, Default)]
-pub struct IoCounters {
-    read: AtomicU64,
-    written: AtomicU64,
-    scratch: AtomicU64,
-    scratch_peak: AtomicU64,
-    stage_peak: AtomicU64,
-}
-
-impl IoCounters {
-    /// Counts `bytes` read from a file.
-    pub fn add_read(&self, bytes: u64) {
-        self.read.fetch_add(bytes, Ordering::Relaxed);
-    }
-
-    /// Counts `bytes` written to a file.
-    pub fn add_written(&self, bytes: u64) {
-        self.written.fetch_add(bytes, Ordering::Relaxed);
-    }
-
-    /// Counts `bytes` of scratch space taken.
-    pub fn grow_scratch(&self, bytes: u64) {
-        let now = self.scratch.fetch_add(bytes, Ordering::Relaxed) + bytes;
-        self.scratch_peak.fetch_max(now, Ordering::Relaxed);
-        self.stage_peak.fetch_max(now, Ordering::Relaxed);
-    }
-
-    /// Begins a new peak, see [`IoCounters::stage_peak`].
-    pub fn begin_stage(&self) {
-        self.stage_peak.store(self.scratch(), Ordering::Relaxed);
-    }
-
-    /// Peak of the scratch space in bytes since the stage began.
-    #[must_use]
-    pub fn stage_peak(&self) -> u64 {
-        self.stage_peak.load(Ordering::Relaxed)
-    }
-
-    /// Counts `bytes` of scratch space given back.
-    pub fn shrink_scratch(&self, bytes: u64) {
-        self.scratch.fetch_sub(bytes, Ordering::Relaxed);
-    }
-
-    /// Scratch space in use now, in bytes.
-    #[must_use]
-    pub fn scratch(&self) -> u64 {
-        self.scratch.load(Ordering::Relaxed)
-    }
-
-    /// Bytes read so far.
-    #[must_use]
-    pub fn read(&self) -> u64 {
-        self.read.load(Ordering::Relaxed)
-    }
-
-    /// Bytes written so far.
-    #[must_use]
-    pub fn written(&self) -> u64 {
-        self.written.load(Ordering::Relaxed)
-    }
-
-    /// Peak of the scratch space in bytes.
-    #[must_use]
-    pub fn scratch_peak(&self) -> u64 {
-        self.scratch_peak.load(Ordering::Relaxed)
-    }
-}
 
 /// The scratch folder, memory budget, threads, progress and cancellation of one run.
 pub struct Workspace {

@@ -1,5 +1,6 @@
 //! The mesh file while it is being written: slices at known offsets, under a temporary name.
 
+use super::batch::Batch;
 use super::format::{Layout, Mesh, MeshFormat, Positions};
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::fault::{self, Event};
@@ -15,9 +16,6 @@ use std::path::{Path, PathBuf};
 
 /// A triangle with the positions of its corners.
 pub type Placed = ([u32; 3], Positions);
-
-/// Records encoded at a time.
-const BATCH: usize = 1024;
 
 /// A mesh file under its temporary name. It is deleted if it is dropped unfinished, except in a run that can
 /// be resumed.
@@ -351,36 +349,6 @@ impl Drop for MeshFile<'_> {
         if self.owned && self.file.is_some() && !self.workspace.is_resumable() {
             let _ = std::fs::remove_file(&self.temporary);
         }
-    }
-}
-
-/// Collects records and passes them on in batches.
-pub struct Batch<T, F: FnMut(&[T])> {
-    records: Vec<T>,
-    put: F,
-}
-
-impl<T, F: FnMut(&[T])> Batch<T, F> {
-    fn new(put: F) -> Self {
-        Self {
-            records: Vec::with_capacity(BATCH),
-            put,
-        }
-    }
-
-    /// Adds a record.
-    #[inline]
-    pub fn push(&mut self, record: T) {
-        self.records.push(record);
-        if self.records.len() == BATCH {
-            (self.put)(&self.records);
-            self.records.clear();
-        }
-    }
-
-    /// Passes on the remaining records.
-    pub fn finish(mut self) {
-        (self.put)(&self.records);
     }
 }
 

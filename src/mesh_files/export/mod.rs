@@ -4,6 +4,7 @@
 //!
 //! A format is a module that implements `MeshFormat`, and an entry of the list here.
 
+mod batch;
 mod bounds;
 mod compressed;
 mod coordinates;

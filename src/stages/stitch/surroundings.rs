@@ -1,20 +1,22 @@
 //! The mesh around the candidates of one turn of the pass across blocks. It is discarded between turns.
 
+mod read;
+
 use super::Insertion;
 use super::admissibility::Neighborhood;
 use super::components::Whose;
 use super::deferred::Deferred;
 use super::insertion::{Candidate, Mesh};
-use super::interior::{TriangleIn, VertexAt};
-use crate::ids::{Block, Component, GlobalLabel, Id, Ids, TriangleIndex};
+use crate::ids::{Block, Component, GlobalLabel, Id, TriangleIndex};
 use crate::surface::parity::{OrientationConstraint, ParitySets, Turned, constraint, word};
-use crate::surface::rows::{LabelledTo, TriangleTo};
+use crate::surface::rows::TriangleTo;
 use crate::surface::star::{Triangle, others};
 use outcrop_disk::error::Result;
 use outcrop_disk::spill::row;
 use outcrop_disk::workspace::Unit;
 use outcrop_disk::workspace::memory::{Holding, Reservation, bytes_of, table_bytes};
 use outcrop_geom::Point;
+use read::{Found, Positions};
 use rustc_hash::FxHashMap;
 
 /// The star of a candidate's vertex.
@@ -118,53 +120,6 @@ impl Mesh for Surroundings<'_> {
             star.triangles.push(number);
             star.changed = now;
         }
-    }
-}
-
-/// The triangles of a block at the requested vertices.
-struct Found {
-    interior: Vec<TriangleIn>,
-    crossing: Vec<LabelledTo>,
-    changes: Vec<Change>,
-}
-
-impl Found {
-    fn count(&self) -> usize {
-        self.interior.len() + self.crossing.len() + self.changes.len()
-    }
-}
-
-/// The positions that a block wrote.
-struct Positions {
-    ids: Ids,
-    /// Vertices, ascending.
-    vertices: Vec<VertexAt>,
-    /// Indices in `vertices` of the block's own vertices, which are the great majority.
-    places: Vec<u32>,
-}
-
-impl Positions {
-    fn new(ids: Ids, vertices: Vec<VertexAt>) -> Self {
-        let mut places = vec![0u32; ids.len()];
-        for (place, vertex) in (0..).zip(&vertices) {
-            if ids.contains(&vertex.id) {
-                places[ids.place(vertex.id)] = place;
-            }
-        }
-        Self {
-            ids,
-            vertices,
-            places,
-        }
-    }
-
-    fn at(&self, v: Id) -> Point {
-        let place = if self.ids.contains(&v) {
-            self.places[self.ids.place(v)] as usize
-        } else {
-            self.vertices.partition_point(|vertex| vertex.id < v)
-        };
-        self.vertices[place].position
     }
 }
 
