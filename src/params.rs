@@ -2,10 +2,12 @@
 
 mod facing;
 mod lengths;
+mod origin;
 mod smooth;
 
 pub use facing::Facing;
 pub use lengths::{MaxWidth, Radius};
+pub use origin::Origin;
 use outcrop_disk::error::{Error, Result, Setting};
 use outcrop_disk::workspace::progress::Observer;
 use outcrop_geom::method::METHOD;
@@ -37,31 +39,6 @@ impl std::str::FromStr for Method {
             "robust" => Ok(Method::Robust),
             "paper" => Ok(Method::Paper),
             _ => Err(format!("{text:?} is not robust or paper")),
-        }
-    }
-}
-
-/// The origin of the coordinates in the mesh file.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Origin {
-    /// That of the input's coordinates.
-    None,
-    /// A round position below the cloud, where single precision does not suffice without it.
-    Auto,
-    /// The lattice position nearest to this one, in the input's coordinates.
-    At([f64; 3]),
-}
-
-impl std::str::FromStr for Origin {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("{text:?} is not auto, none, or three numbers like 635000,848000,0");
-        match text.trim() {
-            "auto" => Ok(Self::Auto),
-            "none" => Ok(Self::None),
-            numbers => facing::position(numbers).map(Self::At).ok_or_else(wrong),
         }
     }
 }

@@ -2,6 +2,7 @@
 
 mod attributes;
 mod bad_input;
+mod bad_places;
 mod built;
 mod cli;
 mod compressed;
@@ -21,6 +22,7 @@ mod regions;
 mod report;
 mod scanners;
 mod scans;
+mod squares;
 mod stop;
 mod systems;
 mod text;

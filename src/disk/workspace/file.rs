@@ -6,65 +6,26 @@
 use super::fault::{self, Event};
 use super::keeper::{Kept, Leaving};
 use super::mapped::Mapping;
-use super::memory::{MemoryPool, Reservation};
+use super::memory::Reservation;
 use super::open::{failed_write, open_existing, options};
 use super::place::{Place, Put};
 use super::run::ResumableRun;
-use super::storage::Storage;
-use super::{IoCounters, Unit, lock};
+use super::storage::Shared;
+use super::{Unit, lock};
 use crate::error::{Error, Result};
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicI32, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, OnceLock};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 
 /// Bytes of memory for a section.
 const SECTION: u64 = size_of::<Place>() as u64;
 
 /// Lists of up to this number of sections are not reserved by name.
 const FEW: usize = 1024;
-
-/// State shared by the files of a workspace.
-#[derive(Debug)]
-pub struct Shared {
-    /// Path of the scratch folder.
-    pub folder: PathBuf,
-    /// Bytes moved.
-    pub io: Arc<IoCounters>,
-    /// The run, if it can be resumed.
-    pub run: Option<ResumableRun>,
-    /// Expected peak of scratch bytes.
-    pub expected: AtomicU64,
-    /// The budget, from which the lists of sections are reserved.
-    pub memory: MemoryPool,
-    /// How files are read and written.
-    pub storage: OnceLock<Storage>,
-    /// The level at which rows are compressed; 0: they are not, as long as it is `UNDECIDED`.
-    pub level: AtomicI32,
-}
-
-/// Bytes that a thread takes to compress a section: tables of Zstandard, up to 2.5 MiB at level 3, and the
-/// compressed copy.
-pub(super) const COMPRESSING: u64 = 4 << 20;
-
-/// The level before it is known whether compression pays.
-pub(super) const UNDECIDED: i32 = -1;
-
-impl Shared {
-    /// How files are read and written.
-    pub fn storage(&self) -> Storage {
-        self.storage.get().copied().unwrap_or_default()
-    }
-
-    /// Scratch bytes still to be written, as far as that is known.
-    pub fn more(&self) -> u64 {
-        let expected = self.expected.load(Ordering::Relaxed);
-        expected.saturating_sub(self.io.scratch())
-    }
-}
 
 /// A part of a scratch file that one thread writes.
 #[derive(Debug)]

@@ -1,7 +1,8 @@
 //! The scratch files that are in use, by name.
 
-use super::file::{ScratchFile, Shared};
+use super::file::ScratchFile;
 use super::lock;
+use super::storage::Shared;
 use crate::error::Result;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};

@@ -42,7 +42,6 @@ pub use storage::{Compression, Storage};
 pub use unit::Unit;
 
 use crate::error::{Error, Result};
-use file::Shared;
 use generations::{Opened, Resources};
 use memory::{MemoryPool, Reservation};
 use progress::{Cancel, Observer};
@@ -51,6 +50,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicI32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Instant;
+use storage::Shared;
 
 /// The scratch folder, memory budget, threads, progress and cancellation of one run.
 pub struct Workspace {
@@ -144,7 +144,7 @@ impl Workspace {
             expected: AtomicU64::new(0),
             memory: memory.clone(),
             storage: OnceLock::new(),
-            level: AtomicI32::new(file::UNDECIDED),
+            level: AtomicI32::new(storage::UNDECIDED),
         });
         Self {
             folder,
@@ -252,7 +252,7 @@ impl Workspace {
 
     /// Compresses rows from now on.
     fn compress_rows(&self, level: i32) -> Result<()> {
-        let bytes = self.threads as u64 * file::COMPRESSING;
+        let bytes = self.threads as u64 * storage::COMPRESSING;
         *lock(&self.compressing) = Some(self.memory.promise("compression", bytes)?);
         self.shared.level.store(level, Ordering::Relaxed);
         Ok(())
@@ -280,7 +280,7 @@ impl Workspace {
     pub fn expect_scratch(&self, bytes: u64) {
         self.shared.expected.store(bytes, Ordering::Relaxed);
         let auto = self.shared.storage().compression == Compression::Auto;
-        if auto && self.shared.level.load(Ordering::Relaxed) == file::UNDECIDED {
+        if auto && self.shared.level.load(Ordering::Relaxed) == storage::UNDECIDED {
             self.shared.level.store(0, Ordering::Relaxed);
             if disk::compression_pays(&self.folder, bytes, self.threads) {
                 // Without room for it, rows are not compressed.
