@@ -9,6 +9,7 @@ use outcrop_geom::clip::Cell;
 use outcrop_geom::clip::wrap::{MOST_NEIGHBORS, Site, TOGETHER, Wrapper};
 use outcrop_geom::kernels::Level;
 use outcrop_geom::plane::Normal;
+use outcrop_stages::ids::Id;
 use outcrop_stages::tiles::neighbors::Neighbors;
 
 const POINTS: usize = 20_000;
@@ -21,11 +22,11 @@ fn main() {
 type Task = (u32, Normal, f64, Neighbors);
 
 fn tasks() -> Vec<Task> {
-    let task = |(id, near): (u32, Neighbors)| {
+    let task = |(id, near): (Id, Neighbors)| {
         let plane = near.moments(util::NEIGHBORS, Level::best()).plane();
         let last = near.get(util::NEIGHBORS - 1)?;
         Some((
-            id,
+            id.get(),
             plane.normal?,
             2.0 * (last.distance2 as f64).sqrt(),
             near,

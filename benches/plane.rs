@@ -6,6 +6,7 @@ use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use outcrop_geom::kernels::Level;
 use outcrop_geom::plane::{Moments, PLANES, planes};
+use outcrop_stages::ids::Id;
 use outcrop_stages::tiles::neighbors::Neighbors;
 
 const POINTS: usize = 20_000;
@@ -14,7 +15,7 @@ fn main() {
     divan::main();
 }
 
-fn neighbors() -> Vec<(u32, Neighbors)> {
+fn neighbors() -> Vec<(Id, Neighbors)> {
     util::neighbors(POINTS)
 }
 

@@ -6,6 +6,7 @@ use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::memory::MemoryPool;
 use outcrop_disk::workspace::progress::{Cancel, Silent};
 use outcrop_geom::Point;
+use outcrop_stages::ids::Id;
 use outcrop_stages::order::{Orderer, PAGE, PointStore};
 use outcrop_stages::tiles::Tile;
 use outcrop_stages::tiles::near::Search;
@@ -64,7 +65,7 @@ pub fn store(count: usize, workspace: &Workspace) -> PointStore {
 }
 
 /// The id and nearest neighbours of every point, at least [`NEIGHBORS`], nearest first.
-pub fn neighbors(count: usize) -> Vec<(u32, Neighbors)> {
+pub fn neighbors(count: usize) -> Vec<(Id, Neighbors)> {
     let workspace = workspace();
     let store = store(count, &workspace);
     let tile = Tile::load(&store, 0..store.len()).expect("scratch file");

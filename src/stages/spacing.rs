@@ -78,7 +78,7 @@ const MOST_NOISE: u8 = 1;
 #[derive(Debug, Clone, Copy)]
 pub struct Nearby<'a> {
     /// Their ids.
-    pub ids: &'a [u32],
+    pub ids: &'a [Id],
     /// Their differences to the point, by axis.
     pub differences: [&'a [i32]; 3],
 }
@@ -229,15 +229,15 @@ impl Density<'_> {
 
     /// True if a point's neighbours `ids` reach farther than is usual in its region and, unless it has the noise of
     /// strewn points, than is usual where the neighbours are: a coarse part of a surface lies among coarse points.
-    fn is_remote(&self, id: Id, last2: u64, ids: &[u32]) -> bool {
+    fn is_remote(&self, id: Id, last2: u64, ids: &[Id]) -> bool {
         let region2 = self.spacings.stored.regions2[id.index() / METHOD.curve.block as usize];
         is_far(last2, region2)
             && (self.noise_at(id) == HIGHEST || is_far(last2, self.usual2_among(ids)))
     }
 
     /// The median of the usual reaches of the patches in which points are, squared.
-    fn usual2_among(&self, ids: &[u32]) -> u64 {
-        let usual2 = |id: &u32| self.spacings.usual2(Id::new(*id));
+    fn usual2_among(&self, ids: &[Id]) -> u64 {
+        let usual2 = |id: &Id| self.spacings.usual2(*id);
         let mut all: Vec<u64> = ids.iter().map(usual2).collect();
         let middle = all.len() / 2;
         if all.is_empty() {

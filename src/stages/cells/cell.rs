@@ -153,7 +153,7 @@ impl<'a> CellMaker<'a> {
         let all = near.columns();
         let count = self.neighbors.min(near.len());
         let near = Nearby {
-            ids: &all.ids[..count],
+            ids: bytemuck::cast_slice(&all.ids[..count]),
             differences: [all.x, all.y, all.z].map(|axis| &axis[..count]),
         };
         let (normal, radius) = self.disk(id, fit, near)?;
@@ -182,7 +182,7 @@ impl<'a> CellMaker<'a> {
         fit: &Fit,
         each: impl FnMut(u32, u32),
     ) -> Outcome {
-        match self.start(Id::new(query.id()), fit, query.near()) {
+        match self.start(query.id(), fit, query.near()) {
             Ok(()) => self.clip(query, each),
             Err(outcome) => outcome,
         }
@@ -216,10 +216,7 @@ impl<'a> CellMaker<'a> {
         point: Point,
         each: impl FnMut(u32, u32),
     ) -> Result<Outcome> {
-        let mut source = (
-            Walk::new(store, cache, id.get(), point),
-            Neighbors::default(),
-        );
+        let mut source = (Walk::new(store, cache, id, point), Neighbors::default());
         let Some(fit) = fit_from(&mut source, self.neighbors, self.widen)? else {
             return Ok(Outcome::Uncertain);
         };

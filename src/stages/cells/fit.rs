@@ -1,5 +1,6 @@
 //! The plane through the nearest neighbours of a point.
 
+use crate::ids::Id;
 use crate::order::PointStore;
 use crate::tiles::near::{Query, Sums};
 use crate::tiles::neighbors::Neighbors;
@@ -158,7 +159,7 @@ pub fn fit_in_tile(query: &mut Query<'_>, neighbors: usize, widen: Widen) -> Res
 pub fn fit_in_store(
     store: &PointStore,
     cache: &mut PageCache,
-    id: u32,
+    id: Id,
     point: Point,
     (neighbors, least): (usize, usize),
     widen: Widen,
@@ -176,7 +177,7 @@ pub fn fit_in_store(
 pub fn near_in_store(
     store: &PointStore,
     cache: &mut PageCache,
-    id: u32,
+    id: Id,
     point: Point,
     count: usize,
 ) -> Result<Neighbors> {

@@ -1,6 +1,7 @@
 //! The planes and neighbours of the points of a tile, for stages other than this one.
 
 use super::fit::{Fit, Widen, fit_in_store, fit_in_tile, near_in_store};
+use crate::ids::Id;
 use crate::order::PointStore;
 use crate::tiles::Tile;
 use crate::tiles::near::{Around, Query, Search, Sums};
@@ -76,7 +77,7 @@ impl<'a> Planes<'a> {
             if widen == Widen::Never {
                 return each_sum(&self.tile, count, (search, grown), wanted, found);
             }
-            let look = |id: u32, point: Point, query: Option<Query<'_>>| {
+            let look = |id: Id, point: Point, query: Option<Query<'_>>| {
                 let fit = query.map(|mut query| fit_in_tile(&mut query, count, widen));
                 let fit = fit.transpose().map(Option::flatten);
                 match fit {
@@ -87,7 +88,7 @@ impl<'a> Planes<'a> {
             self.tile
                 .for_some_queries(count, search, wanted, grown, look);
         };
-        let in_store = |cache: &mut PageCache, id: u32, point: Point| {
+        let in_store = |cache: &mut PageCache, id: Id, point: Point| {
             let known = fit_in_store(self.store, cache, id, point, (count, 0), widen)?;
             Ok(known.map(|(fit, _)| fit))
         };
@@ -101,12 +102,12 @@ impl<'a> Planes<'a> {
         widen: Widen,
         least: usize,
         wanted: impl Fn(usize) -> bool,
-        of: impl FnMut(u32, &Fit, &Neighbors) -> T,
+        of: impl FnMut(Id, &Fit, &Neighbors) -> T,
         each: impl FnMut(usize, Point, &T),
     ) -> Result<()> {
         let (of, count) = (RefCell::new(of), self.neighbors);
         let in_tile = |(search, grown): Watched<'_, '_>, found: &mut Found<'_, T>| {
-            let look = |id: u32, point: Point, query: Option<Query<'_>>| {
+            let look = |id: Id, point: Point, query: Option<Query<'_>>| {
                 let value = |mut query: Query<'_>| -> Result<Option<T>> {
                     let fit = fit_in_tile(&mut query, count, widen)?;
                     let enough = query.near().len() >= least || query.extend_to(least);
@@ -123,7 +124,7 @@ impl<'a> Planes<'a> {
             self.tile
                 .for_some_queries(count, search, wanted, grown, look);
         };
-        let in_store = |cache: &mut PageCache, id: u32, point: Point| {
+        let in_store = |cache: &mut PageCache, id: Id, point: Point| {
             let counts = (count, least);
             let known = fit_in_store(self.store, cache, id, point, counts, widen)?;
             Ok(known.map(|(fit, near)| (of.borrow_mut())(id, &fit, &near)))
@@ -135,12 +136,12 @@ impl<'a> Planes<'a> {
     pub fn each_neighborhood<T>(
         &self,
         wanted: impl Fn(usize) -> bool,
-        of: impl FnMut(u32, &Neighbors) -> T,
+        of: impl FnMut(Id, &Neighbors) -> T,
         each: impl FnMut(usize, Point, &T),
     ) -> Result<()> {
         let (of, count) = (RefCell::new(of), self.neighbors);
         let in_tile = |(search, grown): Watched<'_, '_>, found: &mut Found<'_, T>| {
-            let look = |id: u32, point: Point, query: Option<Query<'_>>| {
+            let look = |id: Id, point: Point, query: Option<Query<'_>>| {
                 let known = query.and_then(|mut query| {
                     let known = query.extend_to(count);
                     known.then(|| (of.borrow_mut())(id, query.near()))
@@ -150,7 +151,7 @@ impl<'a> Planes<'a> {
             self.tile
                 .for_some_queries(count, search, wanted, grown, look);
         };
-        let in_store = |cache: &mut PageCache, id: u32, point: Point| {
+        let in_store = |cache: &mut PageCache, id: Id, point: Point| {
             let near = near_in_store(self.store, cache, id, point, count)?;
             Ok(Some((of.borrow_mut())(id, &near)))
         };
@@ -167,7 +168,7 @@ fn each_sum(
     found: &mut Found<'_, Fit>,
 ) {
     let mut several = Several::default();
-    let look = |id: u32, point: Point, sums: Option<&Sums>| match sums {
+    let look = |id: Id, point: Point, sums: Option<&Sums>| match sums {
         Some(sums) => several.add(id, point, sums, found),
         None => found(id, point, Ok(None)),
     };
@@ -185,7 +186,7 @@ pub fn each_neighborhood<T>(
     store: &PointStore,
     ids: Range<usize>,
     count: usize,
-    of: impl FnMut(u32, &Neighbors) -> T,
+    of: impl FnMut(Id, &Neighbors) -> T,
     each: impl FnMut(usize, Point, &T),
 ) -> Result<()> {
     let all = |_| true;
@@ -208,9 +209,9 @@ pub(crate) fn each_around(
     let planes = Planes::load(unit, store, ids, &wanted, count)?;
     let each = RefCell::new(each);
     let in_tile = |(search, grown): Watched<'_, '_>, found: &mut Found<'_, ()>| {
-        let look = |id: u32, point: Point, around: Option<&Around>| {
+        let look = |id: Id, point: Point, around: Option<&Around>| {
             if let Some(around) = around {
-                (each.borrow_mut())(id as usize, point, around);
+                (each.borrow_mut())(id.index(), point, around);
             }
             found(id, point, Ok(around.map(|_| &())));
         };
@@ -219,10 +220,10 @@ pub(crate) fn each_around(
             .for_some_around(count, search, &wanted, grown, look);
     };
     let mut around = Around::default();
-    let in_store = |cache: &mut PageCache, id: u32, point: Point| {
+    let in_store = |cache: &mut PageCache, id: Id, point: Point| {
         let near = near_in_store(store, cache, id, point, count)?;
         around.set(&near, count, id);
-        (each.borrow_mut())(id as usize, point, &around);
+        (each.borrow_mut())(id.index(), point, &around);
         Ok(Some(()))
     };
     look(unit, in_tile, in_store, |_, _, _| ())
@@ -233,14 +234,14 @@ pub(crate) fn each_around(
 struct Several {
     level: Level,
     count: usize,
-    points: [(u32, Point); PLANES],
+    points: [(Id, Point); PLANES],
     moments: [Moments; PLANES],
     /// Squared distances of the last neighbours.
     lasts: [u64; PLANES],
 }
 
 impl Several {
-    fn add(&mut self, id: u32, point: Point, sums: &Sums, found: &mut Found<'_, Fit>) {
+    fn add(&mut self, id: Id, point: Point, sums: &Sums, found: &mut Found<'_, Fit>) {
         self.points[self.count] = (id, point);
         self.moments[self.count] = sums.moments;
         self.lasts[self.count] = sums.last2;
@@ -264,7 +265,7 @@ impl Several {
 }
 
 /// Receives the result for a point; `None` if the tile cannot certify it.
-type Found<'a, T> = dyn FnMut(u32, Point, Result<Option<&T>>) + 'a;
+type Found<'a, T> = dyn FnMut(Id, Point, Result<Option<&T>>) + 'a;
 
 /// A search, and the function that is told how large it has grown.
 type Watched<'a, 'g> = (&'a mut Search, &'a mut (dyn FnMut(u64) + 'g));
@@ -274,7 +275,7 @@ type Watched<'a, 'g> = (&'a mut Search, &'a mut (dyn FnMut(u64) + 'g));
 fn look<T>(
     unit: &Unit<'_>,
     in_tile: impl FnOnce(Watched<'_, '_>, &mut Found<'_, T>),
-    mut in_store: impl FnMut(&mut PageCache, u32, Point) -> Result<Option<T>>,
+    mut in_store: impl FnMut(&mut PageCache, Id, Point) -> Result<Option<T>>,
     mut each: impl FnMut(usize, Point, &T),
 ) -> Result<()> {
     let mut uncertain = Vec::new();
@@ -283,7 +284,7 @@ fn look<T>(
     let mut held = unit.hold(0);
     let watched: Watched<'_, '_> = (&mut search, &mut |bytes| held.set(bytes));
     in_tile(watched, &mut |id, point, found| match found {
-        Ok(Some(found)) => each(id as usize, point, found),
+        Ok(Some(found)) => each(id.index(), point, found),
         Ok(None) => uncertain.push((id, point)),
         Err(error) => failed = Err(error),
     });
@@ -292,7 +293,7 @@ fn look<T>(
     let mut cache = PageCache::default();
     for (id, point) in uncertain {
         if let Some(found) = in_store(&mut cache, id, point)? {
-            each(id as usize, point, &found);
+            each(id.index(), point, &found);
         }
         held.set(cache.bytes());
     }

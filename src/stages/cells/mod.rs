@@ -295,9 +295,9 @@ fn one_tile(
     let mut searching = unit.hold(0);
     let grown = |bytes| searching.set(bytes);
     tile.for_each_group(maker.neighbors, &mut search, grown, |group| {
-        let outcomes = maker.from_group(group, |id, a, b| seen.see(Id::new(id), [a, b]));
+        let outcomes = maker.from_group(group, |id, a, b| seen.see(id, [a, b]));
         for (number, (member, outcome)) in group.members().iter().zip(outcomes).enumerate() {
-            let id = Id::new(member.id);
+            let id = member.id;
             let outcome = match outcome {
                 Some(outcome) => Ok(outcome),
                 None => match group.query(number) {

@@ -16,7 +16,7 @@ impl CellMaker<'_> {
     pub fn from_group(
         &mut self,
         group: &mut Group<'_>,
-        mut each: impl FnMut(u32, u32, u32),
+        mut each: impl FnMut(Id, u32, u32),
     ) -> [Option<Outcome>; TOGETHER] {
         let members = group.members();
         let mut outcomes = [None; TOGETHER];
@@ -34,7 +34,7 @@ impl CellMaker<'_> {
                 }
                 outcomes[place] = Some(Outcome::Complete);
             } else {
-                self.cell.start(member.id, site.normal, site.radius);
+                self.cell.start(member.id.get(), site.normal, site.radius);
                 for side in sides.iter().map(|side| *side as usize) {
                     let difference = site.differences.map(|column| i64::from(column[side]));
                     self.cell.clip(difference, ids[side]);
@@ -63,10 +63,10 @@ impl CellMaker<'_> {
                 continue;
             }
             let near = Nearby {
-                ids: &member.ids()[..self.neighbors],
+                ids: bytemuck::cast_slice(&member.ids()[..self.neighbors]),
                 differences: member.differences().map(|axis| &axis[..self.neighbors]),
             };
-            match self.disk(Id::new(member.id), &fit, near) {
+            match self.disk(member.id, &fit, near) {
                 Err(outcome) => outcomes[place] = Some(outcome),
                 Ok((normal, radius)) => {
                     places.push(place);

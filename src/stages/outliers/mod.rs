@@ -121,7 +121,7 @@ fn one_tile(
     let mut failed = Ok(());
     let of = |id, near: &Neighbors| {
         let around = near.columns().ids[..count].iter();
-        let out = spacings.stand_out(Id::new(id), around.map(|id| Id::new(*id)), factor);
+        let out = spacings.stand_out(id, around.map(|id| Id::new(*id)), factor);
         out.unwrap_or_else(|error| {
             failed = Err(error);
             false

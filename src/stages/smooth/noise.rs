@@ -4,6 +4,7 @@
 use super::Relaxing;
 use super::level::Gauge;
 use crate::cells::{Planes, Widen};
+use crate::ids::Id;
 use crate::levels::Levels;
 use crate::order::PointStore;
 use crate::spacing::StoredSpacings;
@@ -40,7 +41,7 @@ struct Seen {
 /// A sample of a region.
 #[derive(Debug, Clone, Copy)]
 struct Sample {
-    id: u32,
+    id: Id,
     /// Squared distance of the last neighbour.
     last2: u64,
     level: u8,
@@ -125,9 +126,9 @@ fn look_at(
         (id..last).for_each(|id| levels.set(id - ids.start, level));
     };
     if noisy {
-        let measured = |sample: &&Sample| is_measured(sample.id as usize);
+        let measured = |sample: &&Sample| is_measured(sample.id.index());
         for sample in samples.iter().filter(measured) {
-            put(&mut levels, sample.id as usize, sample.level);
+            put(&mut levels, sample.id.index(), sample.level);
         }
     }
     drop((samples, held));
@@ -160,7 +161,7 @@ fn is_measured(id: usize) -> bool {
 /// True if there is a run in which fewer than one in ten samples have no plain noise. Edges and details beside
 /// smooth surface leave more.
 fn is_noisy(samples: &[Sample]) -> bool {
-    let run = |sample: &Sample| sample.id as usize / METHOD.curve.run;
+    let run = |sample: &Sample| sample.id.index() / METHOD.curve.run;
     let runs = samples.chunk_by(|a, b| run(a) == run(b));
     let mut full = runs.filter(|run| run.len() == METHOD.curve.run);
     full.any(|run| {
@@ -171,7 +172,7 @@ fn is_noisy(samples: &[Sample]) -> bool {
 
 /// The usual reach of each patch, squared: the lower quartile over its samples.
 fn usual_reach(samples: &[Sample]) -> Vec<u64> {
-    let patch = |sample: &Sample| sample.id as usize / METHOD.curve.patch;
+    let patch = |sample: &Sample| sample.id.index() / METHOD.curve.patch;
     let patches = samples.chunk_by(|a, b| patch(a) == patch(b));
     let reach = |patch: &[Sample]| patch.iter().map(|sample| sample.last2).collect();
     patches.map(|patch| lower_quartile(reach(patch))).collect()

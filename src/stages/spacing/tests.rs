@@ -57,8 +57,8 @@ fn standing_in(near: &[Point], there: u64, noise: Option<u8>) -> Standing {
         neighbors: near.len(),
         limits,
     };
-    let ids: Vec<u32> = (0..near.len())
-        .map(|k| (METHOD.curve.patch + k) as u32)
+    let ids: Vec<Id> = (0..near.len())
+        .map(|k| Id::at(METHOD.curve.patch + k))
         .collect();
     let near = Nearby {
         ids: &ids,

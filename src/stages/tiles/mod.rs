@@ -12,7 +12,7 @@ mod points;
 pub mod walk;
 pub mod wanted;
 
-use crate::ids::PageNumber;
+use crate::ids::{Id, PageNumber};
 use crate::order::PointStore;
 use halo::{Reach, halo};
 use outcrop_disk::error::Result;
@@ -38,7 +38,7 @@ pub struct Near {
     /// Exact squared distance in steps.
     pub distance2: u64,
     /// The neighbour's id; breaks ties of distance.
-    pub id: u32,
+    pub id: Id,
     /// Position minus the query's position.
     pub difference: [i64; 3],
 }

@@ -72,7 +72,7 @@ impl Tile {
         k: usize,
         search: &mut Search,
         grown: impl FnMut(u64),
-        each: impl FnMut(u32, Point, Option<Query<'_>>),
+        each: impl FnMut(Id, Point, Option<Query<'_>>),
     ) {
         self.for_some_queries(k, search, |_| true, grown, each);
     }
@@ -84,7 +84,7 @@ impl Tile {
         search: &mut Search,
         wanted: impl Fn(usize) -> bool,
         grown: impl FnMut(u64),
-        mut each: impl FnMut(u32, Point, Option<Query<'_>>),
+        mut each: impl FnMut(Id, Point, Option<Query<'_>>),
     ) {
         self.for_groups(k, search, wanted, grown, |own, index, id, search| {
             let query = self.query(own, index, id, k, search);
@@ -99,7 +99,7 @@ impl Tile {
         &'a self,
         own: &'a OwnPage,
         index: usize,
-        id: u32,
+        id: Id,
         k: usize,
         search: &'a mut Search,
     ) -> Option<Query<'a>> {
@@ -122,14 +122,14 @@ impl Tile {
         search: &mut Search,
         wanted: impl Fn(usize) -> bool,
         grown: impl FnMut(u64),
-        mut one: impl FnMut(&OwnPage, usize, u32, &mut Search) -> u64,
+        mut one: impl FnMut(&OwnPage, usize, Id, &mut Search) -> u64,
     ) {
         let wanted = |id: usize| self.ids.contains(&id) && wanted(id);
         let leaf = |own: &OwnPage, first: usize, group: Range<usize>, search: &mut Search| {
             let mut farthest = 0;
             for (id, index) in (first..).zip(group) {
                 if wanted(id) {
-                    farthest = one(own, index, Id::at(id).get(), search).max(farthest);
+                    farthest = one(own, index, Id::at(id), search).max(farthest);
                     search.swap_back();
                 }
             }
@@ -184,18 +184,18 @@ impl Tile {
         &self,
         own: &OwnPage,
         index: usize,
-        id: u32,
+        id: Id,
         k: usize,
         search: &mut Search,
     ) -> Option<u64> {
         let point = self.points.get(index);
-        if let Some(complete2) = list_nearest(search.level, search, point, id, k) {
+        if let Some(complete2) = list_nearest(search.level, search, point, id.get(), k) {
             return Some(complete2);
         }
         if !self.gather_for_one(own, index, k, search) {
             return None;
         }
-        list_nearest(search.level, search, point, id, k)
+        list_nearest(search.level, search, point, id.get(), k)
     }
 
     /// Gathers enough candidates for the `k` nearest neighbours of point `index`, or all within the reach of

@@ -1,6 +1,7 @@
 //! The neighbours of one point in columns, nearest first.
 
 use super::Near;
+use crate::ids::Id;
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_geom::clip::Nearest;
 use outcrop_geom::kernels::{Level, MOST_SUMMED, SUMMED_LIMIT2, second_moments};
@@ -73,7 +74,7 @@ impl Neighbors {
         let distance2 = *self.distances2[..self.len].get(index)?;
         Some(Near {
             distance2,
-            id: self.ids[index],
+            id: Id::new(self.ids[index]),
             difference: [self.x[index], self.y[index], self.z[index]].map(i64::from),
         })
     }
@@ -106,7 +107,7 @@ impl Neighbors {
         // Differences of coordinates in 0..2^30 fit 32 bits.
         let difference = near.difference.map(|c| c as i32);
         self.resize(last + 1)
-            .put(last, near.distance2, near.id, difference);
+            .put(last, near.distance2, near.id.get(), difference);
     }
 
     /// Sets the number of neighbours to `len`; the caller writes the columns.
@@ -173,7 +174,7 @@ mod tests {
             let mut neighbors = Neighbors::default();
             let mut exact = Moments::default();
             for (id, p) in points.iter().enumerate() {
-                neighbors.push(Near { distance2: length2(p), id: id as u32, difference: *p });
+                neighbors.push(Near { distance2: length2(p), id: Id::at(id), difference: *p });
                 exact.add(*p);
             }
             prop_assert_eq!(neighbors.moments(points.len(), Level::best()), exact);

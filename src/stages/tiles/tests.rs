@@ -24,10 +24,10 @@ fn ordered(cloud: &[Point], page: usize) -> (Workspace, PointStore, Vec<Point>) 
 }
 
 /// All other points as (squared distance, id), ascending.
-fn all_near(points: &[Point], id: usize) -> Vec<(u64, u32)> {
+fn all_near(points: &[Point], id: usize) -> Vec<(u64, Id)> {
     let others = (0..points.len()).filter(|&j| j != id);
     let mut all: Vec<_> = others
-        .map(|j| (distance2(points[id], points[j]), j as u32))
+        .map(|j| (distance2(points[id], points[j]), Id::at(j)))
         .collect();
     all.sort_unstable();
     all
@@ -84,11 +84,11 @@ fn check(points: &[Point], tile: &Tile, k: usize, search: &mut Search) {
         search,
         |_| (),
         |id, point, query| {
-            assert_eq!(id as usize, next);
+            assert_eq!(id.index(), next);
             next += 1;
-            assert_eq!(point, points[id as usize]);
+            assert_eq!(point, points[id.index()]);
             let Some(mut query) = query else { return };
-            let expected = all_near(points, id as usize);
+            let expected = all_near(points, id.index());
             let agrees = |query: &near::Query<'_>| {
                 let complete = expected.partition_point(|(d2, _)| *d2 <= query.complete2());
                 let got = query.near().iter().map(|n| (n.distance2, n.id));
@@ -107,7 +107,7 @@ fn check(points: &[Point], tile: &Tile, k: usize, search: &mut Search) {
                 agrees(&query);
             }
             for near in query.near().iter() {
-                let there = points[near.id as usize];
+                let there = points[near.id.index()];
                 assert_eq!(near.difference, outcrop_geom::sub(there, point));
             }
             if query.extend_to(2 * k) {
@@ -126,11 +126,11 @@ fn check(points: &[Point], tile: &Tile, k: usize, search: &mut Search) {
                     .iter()
                     .filter(|(d2, _)| known < *d2 && *d2 <= farther);
                 let beyond = beyond
-                    .filter(|(_, id)| picked(&points[*id as usize]))
+                    .filter(|(_, id)| picked(&points[id.index()]))
                     .copied();
                 let beyond: Vec<_> = beyond.collect();
                 assert!(got.iter().all(|near| beyond.contains(near)));
-                let wanted = beyond.iter().filter(|(_, id)| half(&points[*id as usize]));
+                let wanted = beyond.iter().filter(|(_, id)| half(&points[id.index()]));
                 assert!(wanted.into_iter().all(|near| got.contains(near)));
             }
         },
@@ -138,10 +138,10 @@ fn check(points: &[Point], tile: &Tile, k: usize, search: &mut Search) {
     assert_eq!(next, tile.ids().end);
 }
 
-fn sums_over(points: &[Point], point: Point, nearest: &[(u64, u32)]) -> near::Sums {
+fn sums_over(points: &[Point], point: Point, nearest: &[(u64, Id)]) -> near::Sums {
     let mut moments = Moments::default();
     for (_, near) in nearest {
-        moments.add(outcrop_geom::sub(points[*near as usize], point));
+        moments.add(outcrop_geom::sub(points[near.index()], point));
     }
     near::Sums {
         moments,
@@ -159,10 +159,10 @@ fn check_sums(points: &[Point], tile: &Tile, k: usize, search: &mut Search) {
         wanted,
         |_| (),
         |id, point, sums| {
-            assert_eq!(Some(id as usize), next.pop());
-            assert_eq!(point, points[id as usize]);
+            assert_eq!(Some(id.index()), next.pop());
+            assert_eq!(point, points[id.index()]);
             let Some(sums) = sums else { return };
-            let nearest = &all_near(points, id as usize)[..k];
+            let nearest = &all_near(points, id.index())[..k];
             assert_eq!(*sums, sums_over(points, point, nearest));
         },
     );
@@ -174,26 +174,23 @@ fn check_groups(points: &[Point], tile: &Tile, k: usize, search: &mut Search) ->
     let (mut next, mut known) = (tile.ids().start, 0);
     let each = |group: &mut near::Group<'_>| {
         for (number, member) in group.members().iter().enumerate() {
-            assert_eq!(member.id as usize, next);
+            assert_eq!(member.id.index(), next);
             next += 1;
-            assert_eq!(member.point, points[member.id as usize]);
-            let expected = all_near(points, member.id as usize);
+            assert_eq!(member.point, points[member.id.index()]);
+            let expected = all_near(points, member.id.index());
             let far2 = expected.get(expected.len() / 2).map_or(0, |near| near.0);
             if let Some(columns) = group.within(far2) {
                 let listed =
                     |at: &Point| (0..columns[0].len()).any(|n| columns.map(|c| c[n]) == *at);
                 let near = expected.iter().take_while(|(d2, _)| *d2 <= far2);
-                assert!(
-                    near.into_iter()
-                        .all(|(_, id)| listed(&points[*id as usize]))
-                );
+                assert!(near.into_iter().all(|(_, id)| listed(&points[id.index()])));
             }
             if let Some(sums) = member.sums {
                 known += 1;
                 assert_eq!(sums, sums_over(points, member.point, &expected[..k]));
                 let ids = &member.ids()[..k];
                 assert!(ids.is_sorted());
-                assert!(expected[..k].iter().all(|(_, id)| ids.contains(id)));
+                assert!(expected[..k].iter().all(|(_, id)| ids.contains(&id.get())));
                 let [x, y, z] = member.differences();
                 for (place, id) in ids.iter().enumerate() {
                     let difference = [x[place], y[place], z[place]].map(i64::from);
@@ -282,7 +279,7 @@ proptest! {
         for id in (0..points.len()).step_by(37) {
             let point = points[id];
             let all = all_near(&points, id);
-            let mut walk = Walk::new(&store, &mut cache, id as u32, point);
+            let mut walk = Walk::new(&store, &mut cache, Id::at(id), point);
             for expected in all.iter().take(known) {
                 let next = walk.advance().unwrap().unwrap();
                 prop_assert_eq!((next.distance2, next.id), *expected);
@@ -300,13 +297,13 @@ proptest! {
             }
             prop_assert!(got.is_sorted());
             prop_assert!(got.iter().all(|near| rest.contains(near)));
-            let wanted = |(d2, id): &&(u64, u32)| {
-                let at = &points[*id as usize];
+            let wanted = |(d2, id): &&(u64, Id)| {
+                let at = &points[id.index()];
                 *d2 <= within2 && picked(at) && at[0] >= point[0]
             };
             prop_assert!(rest.iter().filter(wanted).all(|near| got.contains(near)));
             // Points that were ready from an earlier step are returned whether wanted or not.
-            let asked = got.iter().all(|(_, id)| picked(&points[*id as usize]));
+            let asked = got.iter().all(|(_, id)| picked(&points[id.index()]));
             prop_assert!(asked || known > 0);
         }
     }

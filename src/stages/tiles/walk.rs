@@ -90,16 +90,16 @@ type Groups<'a> = Box<dyn Iterator<Item = (u64, Range<usize>)> + 'a>;
 pub struct Walk<'a> {
     store: &'a PointStore,
     cache: &'a mut PageCache,
-    id: u32,
+    id: Id,
     point: Point,
     /// The groups of pages that have not been opened.
     groups: Peekable<Groups<'a>>,
     /// The pages of opened groups.
     pages: BinaryHeap<Page>,
     /// The neighbours to return next, with squared distance and id, farthest first.
-    ready: Vec<(u64, u32, Point)>,
+    ready: Vec<(u64, Id, Point)>,
     /// The other points of opened pages, unordered.
-    later: Vec<(u64, u32, Point)>,
+    later: Vec<(u64, Id, Point)>,
     /// Places of points in a page.
     places: Vec<u32>,
     batch: usize,
@@ -108,7 +108,7 @@ pub struct Walk<'a> {
 impl<'a> Walk<'a> {
     /// Starts at point `id` at the position `point`.
     #[must_use]
-    pub fn new(store: &'a PointStore, cache: &'a mut PageCache, id: u32, point: Point) -> Self {
+    pub fn new(store: &'a PointStore, cache: &'a mut PageCache, id: Id, point: Point) -> Self {
         Self {
             store,
             cache,
@@ -209,7 +209,7 @@ impl<'a> Walk<'a> {
         if self.ready.len() <= self.batch {
             return limit;
         }
-        let nearest = |p: &(u64, u32, Point)| p.0;
+        let nearest = |p: &(u64, Id, Point)| p.0;
         let at = self.batch - 1;
         let limit = self.ready.select_nth_unstable_by_key(at, nearest).1.0;
         let beyond = self.ready.extract_if(self.batch.., |p| p.0 > limit);
@@ -238,7 +238,7 @@ impl<'a> Walk<'a> {
         self.places.clear();
         wanted.pick(columns, &mut self.places);
         for &place in &self.places {
-            let id = first + place;
+            let id = Id::new(first + place);
             let at = columns.map(|column| column[place as usize]);
             let distance = distance2(at, self.point);
             if id != self.id {

@@ -12,6 +12,7 @@ use outcrop_geom::Point;
 use outcrop_stages::blocks::Blocks;
 use outcrop_stages::cells::{TileRanges, Widen};
 use outcrop_stages::cells::{each_neighborhood, each_plane};
+use outcrop_stages::ids::Id;
 use outcrop_stages::order::{Orderer, PAGE, PointStore};
 use outcrop_stages::smooth::{Relaxing, relax};
 use outcrop_stages::tiles::neighbors::Neighbors;
@@ -137,12 +138,12 @@ impl World {
     pub(crate) fn near_edges(&self, cosine: f64) -> Result<Vec<bool>> {
         let k = self.neighbors;
         let mut found = vec![false; self.store.len()];
-        let of = |_, near: &Neighbors| -> Vec<u32> { near.iter().take(k).map(|n| n.id).collect() };
+        let of = |_, near: &Neighbors| -> Vec<Id> { near.iter().take(k).map(|n| n.id).collect() };
         let (unit, all) = (self.workspace.unit(), 0..self.store.len());
         each_neighborhood(&unit, &self.store, all, k, of, |id, _, near| {
             let own = self.truth[id];
             found[id] = near.iter().any(|&n| {
-                let other = self.truth[n as usize];
+                let other = self.truth[n.index()];
                 own[0] * other[0] + own[1] * other[1] + own[2] * other[2] <= cosine
             });
         })?;

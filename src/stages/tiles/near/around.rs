@@ -2,6 +2,7 @@
 
 use super::sums::{Unknown, divided_body};
 use super::{OwnPage, Search};
+use crate::ids::Id;
 use crate::tiles::Tile;
 use crate::tiles::neighbors::Neighbors;
 use outcrop_geom::kernels::{BLOCK, Pick, kernel};
@@ -45,7 +46,7 @@ impl Around {
     }
 
     /// Takes the first `count` of `near`, or all if there are fewer, and point `id` itself.
-    pub fn set(&mut self, near: &Neighbors, count: usize, id: u32) {
+    pub fn set(&mut self, near: &Neighbors, count: usize, id: Id) {
         let mut all: Vec<_> = near.iter().take(count).collect();
         self.last2 = all.last().map_or(0, |near| near.distance2);
         all.sort_unstable_by_key(|near| near.id);
@@ -54,11 +55,11 @@ impl Around {
         differences.insert(before, [0; 3]);
         self.reserve(differences.len());
         self.count = differences.len();
-        let ids = all.iter().map(|near| near.id);
+        let ids = all.iter().map(|near| near.id.get());
         for (to, other) in self.ids.iter_mut().zip(ids.clone().take(before)) {
             *to = other;
         }
-        self.ids[before] = id;
+        self.ids[before] = id.get();
         for (to, other) in self.ids[before + 1..].iter_mut().zip(ids.skip(before)) {
             *to = other;
         }
@@ -97,7 +98,7 @@ impl Tile {
         search: &mut Search,
         wanted: impl Fn(usize) -> bool,
         grown: impl FnMut(u64),
-        mut each: impl FnMut(u32, Point, Option<&Around>),
+        mut each: impl FnMut(Id, Point, Option<&Around>),
     ) {
         let mut around = Around::default();
         self.for_groups(k, search, wanted, grown, |own, index, id, search| {
@@ -113,7 +114,7 @@ impl Tile {
         &self,
         own: &OwnPage,
         index: usize,
-        id: u32,
+        id: Id,
         k: usize,
         search: &mut Search,
         around: &mut Around,

@@ -20,7 +20,7 @@ const MOST_FARTHER: usize = 2;
 #[derive(Debug, Clone)]
 pub struct Neighborhood {
     /// The id of the point.
-    pub id: u32,
+    pub id: Id,
     /// Its position.
     pub point: Point,
     index: usize,
@@ -35,7 +35,7 @@ pub struct Neighborhood {
 
 impl Neighborhood {
     const NONE: Self = Self {
-        id: 0,
+        id: Id::new(0),
         point: [0; 3],
         index: 0,
         sums: None,
@@ -144,7 +144,7 @@ impl Tile {
                     let count = members.len().min(ids.end - begin);
                     let members = &mut members[..count];
                     for (id, member) in (begin..).zip(&mut *members) {
-                        member.id = Id::at(id).get();
+                        member.id = Id::at(id);
                         member.index = leaf.start + (id - first);
                         member.point = self.points.get(member.index);
                         member.sums = None;

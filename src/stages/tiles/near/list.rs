@@ -1,6 +1,7 @@
 //! The sorted list of a query's nearest neighbours.
 
 use super::{APPROXIMATE, CORRECTIONS, Search, above};
+use crate::ids::Id;
 use crate::tiles::Near;
 use crate::tiles::candidates::Columns;
 use crate::tiles::neighbors::Neighbors;
@@ -179,7 +180,7 @@ fn list_keys(near: &mut Neighbors, keys: &mut [(u64, u32)], columns: &Columns, p
         let (at, id) = columns.get(place as usize);
         near.push(Near {
             distance2,
-            id,
+            id: Id::new(id),
             difference: sub(at, point),
         });
     }

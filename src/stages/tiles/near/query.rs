@@ -2,6 +2,7 @@
 
 use super::list::list_nearest;
 use super::{MOST_WIDER, Search};
+use crate::ids::Id;
 use crate::tiles::neighbors::Neighbors;
 use crate::tiles::wanted::Wanted;
 use crate::tiles::{OwnPage, Tile};
@@ -15,7 +16,7 @@ pub struct Query<'a> {
     pub(super) own: &'a OwnPage,
     pub(super) search: &'a mut Search,
     pub(super) point: Point,
-    pub(super) id: u32,
+    pub(super) id: Id,
     /// All points within this squared distance are listed.
     pub(super) complete2: u64,
 }
@@ -23,7 +24,7 @@ pub struct Query<'a> {
 impl Query<'_> {
     /// The id of the point.
     #[must_use]
-    pub fn id(&self) -> u32 {
+    pub fn id(&self) -> Id {
         self.id
     }
 
@@ -69,7 +70,7 @@ impl Query<'_> {
         let columns = candidates.columns.coordinates(candidates.len);
         wanted.pick(columns, &mut search.places);
         let beyond = self.complete2.saturating_add(1);
-        search.list_places(self.point, self.id, beyond..=distance2);
+        search.list_places(self.point, self.id.get(), beyond..=distance2);
         self.complete2 = self.complete2.max(distance2);
         true
     }
@@ -87,7 +88,7 @@ impl Query<'_> {
             }
             let search = &mut *self.search;
             let most = count.max(search.widened.0);
-            let listed = list_nearest(search.level, search, self.point, self.id, most);
+            let listed = list_nearest(search.level, search, self.point, self.id.get(), most);
             self.complete2 = listed.unwrap_or(search.candidates.complete2);
         }
         let last = self.near().get(count - 1).map_or(0, |n| n.distance2);

@@ -3,6 +3,7 @@
 
 use super::list::{likely_body, pick_enough_body};
 use super::{APPROXIMATE, OwnPage, Query, Search, above};
+use crate::ids::Id;
 use crate::tiles::Tile;
 use crate::tiles::neighbors::Sums;
 use outcrop_geom::Point;
@@ -37,7 +38,7 @@ impl Tile {
         search: &mut Search,
         wanted: impl Fn(usize) -> bool,
         grown: impl FnMut(u64),
-        mut each: impl FnMut(u32, Point, Option<&Sums>),
+        mut each: impl FnMut(Id, Point, Option<&Sums>),
     ) {
         let mut sums = Sums::default();
         self.for_groups(k, search, wanted, grown, |own, index, id, search| {
@@ -54,7 +55,7 @@ impl Tile {
         &self,
         own: &OwnPage,
         index: usize,
-        id: u32,
+        id: Id,
         k: usize,
         search: &mut Search,
         sums: &mut Sums,
