@@ -82,6 +82,7 @@ impl<S: RTreeNum> BoxTree<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Point;
     use crate::aabb::Aabb;
     use proptest::prelude::*;
 
@@ -89,8 +90,9 @@ mod tests {
     fn boxes() -> impl Strategy<Value = Vec<Aabb>> {
         let corner = |side| prop::array::uniform3(0..side);
         let of = |side| (corner(side), corner(side)).prop_map(|(a, b)| Aabb::of(&[a, b]));
-        let small = (corner(1 << 30), corner(9))
-            .prop_map(|(a, b)| Aabb::of(&[a, std::array::from_fn(|k| (a[k] - b[k]).max(0))]));
+        let small = (corner(1 << 30), corner(9)).prop_map(|(a, b): (Point, Point)| {
+            Aabb::of(&[a, [0, 1, 2].map(|k| (a[k] - b[k]).max(0))])
+        });
         let any = prop_oneof![4 => small, 1 => of(1 << 30), 2 => of(20)];
         prop::collection::vec(any, 0..400)
     }
