@@ -147,7 +147,7 @@ impl Widen {
 /// certified.
 ///
 /// # Errors
-/// None today; see [`fit_in_store`].
+/// None today; see `fit_in_store`.
 pub fn fit_in_tile(query: &mut Query<'_>, neighbors: usize, widen: Widen) -> Result<Option<Fit>> {
     fit_from(query, neighbors, widen)
 }

@@ -11,7 +11,7 @@ use std::marker::PhantomData;
 /// Sorted rows and their reservation.
 pub type InMemory<R> = (Vec<R>, Option<Reservation>);
 
-/// The rows of a [`Sorter`] in ascending order.
+/// The rows of a [`Sorter`](super::Sorter) in ascending order.
 #[derive(Debug)]
 pub struct Sorted<R: Row> {
     pub(super) buffer: Vec<R>,
