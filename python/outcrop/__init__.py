@@ -50,6 +50,7 @@ __all__ = [
     "compare",
     "info",
     "reconstruct",
+    "simplify",
     "tiles",
     "verify",
 ]
@@ -245,6 +246,34 @@ def tiles(
     options = dict(locals())
     del options["mesh"], options["progress"]
     return run(["tiles", *words(options), "--", _path(mesh)], progress, quiet)[0]
+
+
+def simplify(
+    mesh: Union[Mesh, Path],
+    *,
+    output: Path,
+    progress: Union[Progress, bool, None] = None,
+    triangles: Union[int, float, str, None] = None,
+    ratio: Optional[float] = None,
+    error: Optional[float] = None,
+    keep_boundary: bool = False,
+    samples: Union[int, float, str] = 1_000_000,
+    memory: Optional[Size] = None,
+    threads: Optional[int] = None,
+    scratch: Optional[Path] = None,
+    io: str = "auto",
+    scratch_compression: Union[int, str] = "auto",
+    quiet: bool = False,
+    resume: bool = False,
+    restart: bool = False,
+) -> Answer:
+    """Makes a mesh with fewer triangles of a mesh (PLY), in the file ``output``.
+
+    One of ``triangles``, ``ratio`` and ``error`` says how far it goes. ``Mesh(output)`` opens what was made.
+    """
+    options = dict(locals())
+    del options["mesh"], options["progress"]
+    return run(["simplify", *words(options), "--", _path(mesh)], progress, quiet)[0]
 
 
 def _path(mesh: Union[Mesh, Path]) -> str:

@@ -193,6 +193,29 @@ def test_other_commands(points: Points, tmp_path: Path, program: Any) -> None:
     assert made["triangles"] == verdict["triangles"] and (tmp_path / "levels" / "tileset.json").exists()
 
 
+def test_a_mesh_with_fewer_triangles(points: Points, tmp_path: Path, program: Any) -> None:
+    mesh = outcrop.reconstruct(points, output=tmp_path / "mesh.ply", memory=MEMORY)
+    made = outcrop.simplify(mesh, output=tmp_path / "small.ply", ratio=0.1, samples=1000, memory=MEMORY)
+    small = outcrop.Mesh(tmp_path / "small.ply")
+    assert made["triangles"] == len(small.faces) and made["goal"] == {"ratio": 0.1}
+    assert 0.09 < len(small.faces) / len(mesh.faces) <= 0.1
+    assert outcrop.verify(small, memory=MEMORY)["manifold"] is True
+    assert 0 < made["measured"]["symmetric"]["mean"] < 0.1
+    words = ["--ratio", "0.1", "--samples", "1000", "--memory", MEMORY]
+    said = program("simplify", mesh.path, "-o", tmp_path / "again.ply", *words).stdout
+    assert said.rstrip("\n") == str(made)
+    assert (tmp_path / "again.ply").read_bytes() == (tmp_path / "small.ply").read_bytes()
+    closer = outcrop.simplify(mesh.path, output=tmp_path / "small.obj", error=0.01, memory=MEMORY)
+    assert closer["measured"] is None and closer["triangles"] > made["triangles"]
+    fewest = outcrop.simplify(mesh, output=tmp_path / "small.ply", triangles=2e2, keep_boundary=True, memory=MEMORY)
+    assert fewest["goal"] == {"triangles": 200} and 190 < fewest["triangles"] <= 200
+    wrong: list[dict[str, Any]] = [{}, {"ratio": 0.1, "error": 0.01}, {"ratio": 2.0}]
+    for goals in wrong:
+        with pytest.raises(outcrop.ParameterError, match="ratio"):
+            outcrop.simplify(mesh, output=tmp_path / "none.ply", memory=MEMORY, **goals)
+    assert not (tmp_path / "none.ply").exists()
+
+
 def test_progress_is_told(points: Points) -> None:
     told: list[tuple[str, int, int]] = []
 
