@@ -2,7 +2,7 @@
 
 mod job;
 
-use super::parse::{count, size, system, time};
+use super::parse::{count, samples, size, system, time};
 use crate::pipeline::Start;
 use clap::{ArgAction, Args as ClapArgs};
 pub use job::{Job, Points};
@@ -226,7 +226,7 @@ pub struct Simplify {
     #[arg(long)]
     pub keep_boundary: bool,
     /// Samples of each mesh by which the distance between both is measured, e.g. 1e6; 0: it is not measured
-    #[arg(long, value_name = "N", default_value = "1000000", value_parser = count)]
+    #[arg(long, value_name = "N", default_value = "1000000", value_parser = samples)]
     pub samples: u64,
     /// Most triangles of a cell
     #[arg(long, hide = true, default_value = "131072", value_parser = clap::value_parser!(u32).range(1..))]

@@ -75,6 +75,14 @@ pub fn count(text: &str) -> Result<u64, String> {
     }
 }
 
+/// A number of samples, which may be 0.
+pub fn samples(text: &str) -> Result<u64, String> {
+    match text {
+        "0" => Ok(0),
+        _ => count(text),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

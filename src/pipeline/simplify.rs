@@ -160,8 +160,8 @@ impl Simplification {
             Goal::Ratio(ratio) if !(ratio > 0.0 && ratio <= 1.0) => {
                 refuse("ratio", ratio.to_string(), "more than 0, at most 1")
             }
-            Goal::Error(length) if !(length >= 0.0 && length.is_finite()) => {
-                refuse("error", length.to_string(), "a length, 0 or more")
+            Goal::Error(length) if !(length > 0.0 && length.is_finite()) => {
+                refuse("error", length.to_string(), "a length of more than 0")
             }
             _ => Ok(()),
         }
@@ -171,7 +171,7 @@ impl Simplification {
         let made = single::simplify(&self.mesh, &self.options, workspace)?;
         let observer = &workspace.observer;
         observer.begin("write", "triangles", made.triangles());
-        self.write(&made, workspace)?;
+        workspace.once("write", |_| self.write(&made, workspace))?;
         observer.end();
         let measured = match self.samples {
             0 => None,

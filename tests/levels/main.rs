@@ -4,6 +4,7 @@ mod checks;
 mod globe;
 mod meshes;
 mod resumed;
+mod single;
 mod tileset;
 
 use checks::{Corner, all, cut, errors_are_true, leaves_are_the_mesh, srgb, steps};

@@ -120,14 +120,15 @@ impl<'a> Pass<'a> {
         Ok((patch, ids, foreign))
     }
 
-    /// What each cost removes, in every cell of which `step` is the number or a multiple of it.
-    pub fn curve(&self, step: usize, end: End, workspace: &Workspace) -> Result<Curve> {
+    /// What each cost removes, in every cell whose number is a multiple of `step`; and how many triangles of these
+    /// cells have a corner that stays.
+    pub fn curve(&self, step: usize, end: End, workspace: &Workspace) -> Result<(Curve, u64)> {
         let count = self.cells.cells.len().div_ceil(step);
         let triangles = |n: usize| u64::from(self.cells.cells[n * step].triangles);
         let observer = &workspace.observer;
         let total = (0..count).map(triangles).sum();
         observer.begin("measure", "triangles", total);
-        let mut all = Curve::new();
+        let (mut all, mut held) = (Curve::new(), 0);
         let work = |unit: &Unit<'_>| {
             let cell = unit.number() * step;
             let (mut patch, ..) = self.load(unit, cell)?;
@@ -136,9 +137,10 @@ impl<'a> Pass<'a> {
                 triangles: (part / self.intake.triangles as f64) as usize,
                 ..end
             };
+            let held = patch.held() as u64;
             let curve = contract(&mut patch, own);
             unit.advance(triangles(unit.number()));
-            Ok(curve)
+            Ok((curve, held))
         };
         let name = (format!("measure {}", self.number), "simplify: cells");
         workspace.units(
@@ -146,14 +148,15 @@ impl<'a> Pass<'a> {
             count,
             |n| self.bytes(n * step),
             work,
-            |_, curve: Curve| {
+            |_, (curve, own): (Curve, u64)| {
                 all.extend(curve);
+                held += own;
                 Ok(())
             },
         )?;
         observer.end();
         all.sort_unstable();
-        Ok(all)
+        Ok((all, held))
     }
 
     /// Simplifies all cells.

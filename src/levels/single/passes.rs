@@ -76,7 +76,12 @@ fn step(goal: Goal, triangles: u64) -> Step {
 }
 
 /// The end of the contractions of each cell in a pass.
-fn end(pass: &Pass<'_>, step: Step, triangles: u64, workspace: &Workspace) -> Result<End> {
+fn end(
+    pass: &Pass<'_>,
+    (step, is_last): (Step, bool),
+    triangles: u64,
+    workspace: &Workspace,
+) -> Result<End> {
     let all = |cost| End { cost, triangles: 0 };
     let every = match step {
         Step::UpTo(cost) => return Ok(all(cost)),
@@ -96,12 +101,13 @@ fn end(pass: &Pass<'_>, step: Step, triangles: u64, workspace: &Workspace) -> Re
         cost: f32::MAX,
         triangles: (number / 3) as usize,
     };
-    let curve = pass.curve(every, far, workspace)?;
+    let (curve, held) = pass.curve(every, far, workspace)?;
     let looked = pass.cells.cells.iter().step_by(every);
     let looked: u64 = looked.map(|cell| u64::from(cell.triangles)).sum();
-    let removed = triangles.saturating_sub(number) as f64;
-    let removed = removed * looked as f64 / triangles as f64;
-    Ok(all(cost(&curve, removed as u64)))
+    // Triangles at the borders of cells wait for the next pass, unless this is the last.
+    let free = if is_last { looked } else { looked - held };
+    let part = 1.0 - number as f64 / triangles as f64;
+    Ok(all(cost(&curve, (part * free as f64) as u64)))
 }
 
 /// The mesh that a pass left, read for the next one.
@@ -160,20 +166,18 @@ pub(super) fn run(
         let columns = intake.columns.clone();
         let pass = Pass::new(number, &intake, options, workspace)?;
         let single = pass.cells.cells.len() == 1;
-        let step = match (step(goal, triangles), goal) {
-            (Step::To(_) | Step::Towards(_), Goal::Triangles(wanted)) if single => Step::To(wanted),
-            (step, _) => step,
+        let ends = single || number + 1 == PASSES;
+        let step = match goal {
+            Goal::Triangles(wanted) if ends => Step::To(wanted),
+            goal => step(goal, triangles),
         };
-        let end = end(&pass, step, triangles, workspace)?;
+        let is_last = ends || matches!((goal, step), (Goal::Triangles(a), Step::To(b)) if a == b);
+        let end = end(&pass, (step, is_last), triangles, workspace)?;
         let (kept, cost) = pass.simplify(end, workspace)?;
         highest = highest.max(cost);
         let useless = kept.triangles as f64 > USEFUL * triangles as f64;
-        let last = match (goal, step) {
-            (Goal::Triangles(wanted), Step::To(number)) => number == wanted || useless,
-            (Goal::Error(_), _) => useless || number + 1 == PASSES_TO_ERROR,
-            _ => useless,
-        };
-        if last || single || number + 1 == PASSES {
+        let is_over = matches!(goal, Goal::Error(_)) && (useless || number + 1 == PASSES_TO_ERROR);
+        if is_last || is_over {
             return Ok(Simplified {
                 kept,
                 before,

@@ -6,7 +6,7 @@ use super::quadric::{NUMBERS, Quadric, V3, cross, dot, minus};
 const NONE: u32 = u32::MAX;
 
 /// Least cosine between the normals of a triangle before and after a contraction.
-const TURN: f64 = 0.2;
+const TURN: f64 = 0.5;
 
 /// Least quality of a triangle that a contraction may make, unless one was worse before: 1 for equal sides, 0 for no
 /// area.
@@ -115,6 +115,12 @@ impl Patch {
             all.for_each(|(locked, boundary)| *locked |= boundary);
         }
         patch
+    }
+
+    /// The number of triangles with a corner that stays.
+    pub fn held(&self) -> usize {
+        let is_held = |t: &&[u32; 3]| t.iter().any(|v| self.locked[*v as usize]);
+        self.triangles.iter().filter(is_held).count()
     }
 
     fn corners(&self, triangle: u32) -> [V3; 3] {
