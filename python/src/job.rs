@@ -215,9 +215,17 @@ pub fn keyword(setting: &Setting) -> String {
 /// A reason with its options as keywords.
 fn reworded(why: &str, options: &[String]) -> String {
     options.iter().fold(why.to_owned(), |why, option| {
-        let name = option.trim_start_matches('-');
-        let name = name.split([' ', '=', '[']).next().unwrap_or(name);
-        let name = name.replace('-', "_");
+        // Options of which one must be given are `<--a <N>|--b <N>>`.
+        let each: Vec<&str> = match option.starts_with("<-") {
+            true => option.split('|').collect(),
+            false => vec![option],
+        };
+        let names = each.into_iter().map(|option| {
+            let name = option.trim_start_matches(['<', '-']);
+            let name = name.split([' ', '=', '[', '>']).next().unwrap_or(name);
+            name.replace('-', "_")
+        });
+        let name = names.collect::<Vec<_>>().join(" or ");
         why.replace(&format!("'{option}'"), &name)
             .replace(option, &name)
     })
