@@ -105,5 +105,7 @@ pub use params::{
 };
 pub use pipeline::{Builder, Reconstruction, Start, default_memory, default_threads};
 #[cfg(feature = "levels")]
-pub use pipeline::{Simplification, SimplifyReport, Tiles};
+pub use pipeline::{Simplification, Tiles};
+#[cfg(feature = "levels")]
+pub use report::SimplifyReport;
 pub use report::{DiskEstimate, Report};

@@ -36,7 +36,7 @@ pub use shared::{
     Advanced, Begun, Status, TaskState, Totals, Worked, planned_shards, shared_folder, status,
 };
 #[cfg(feature = "levels")]
-pub use simplify::{Simplification, SimplifyReport};
+pub use simplify::Simplification;
 use stages::Stages;
 pub use start::Start;
 use std::path::{Path, PathBuf};

@@ -1,8 +1,6 @@
 //! The report of a run: the content of `--report`.
 
 use crate::params::Params;
-#[cfg(feature = "levels")]
-pub use crate::pipeline::SimplifyReport;
 pub use histogram::{Bin, Histogram};
 pub use outcrop_disk::workspace::course::Sample;
 use outcrop_draw::histogram;
@@ -42,6 +40,69 @@ impl TilesReport {
 impl std::fmt::Display for TilesReport {
     fn fmt(&self, _: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match *self {}
+    }
+}
+
+/// What became of a mesh that was simplified.
+#[cfg(feature = "levels")]
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SimplifyReport {
+    /// Vertices of the mesh that was read.
+    pub vertices_before: u64,
+    /// Triangles of the mesh that was read.
+    pub triangles_before: u64,
+    /// Vertices of the mesh that was made.
+    pub vertices: u64,
+    /// Triangles of the mesh that was made.
+    pub triangles: u64,
+    /// Triangles of the mesh that was read with two equal corners, which were left out.
+    pub degenerate: u64,
+    /// What was asked for.
+    pub goal: outcrop_levels::single::Goal,
+    /// The largest mean distance of a vertex from the planes of the triangles that it stands for.
+    pub error: f64,
+    /// How often all triangles were looked at.
+    pub passes: u32,
+    /// Distances between both meshes, as `compare` measures them: the first is the mesh that was read.
+    pub measured: Option<outcrop_inspect::compare::Comparison>,
+}
+
+#[cfg(feature = "levels")]
+impl std::fmt::Display for SimplifyReport {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let part = 100.0 * self.triangles as f64 / self.triangles_before.max(1) as f64;
+        write!(
+            f,
+            "{} of {} triangles ({part:.2} %), {} vertices",
+            self.triangles, self.triangles_before, self.vertices
+        )?;
+        if let outcrop_levels::single::Goal::Triangles(wanted) = self.goal
+            && self.triangles > wanted + wanted / 100
+        {
+            write!(
+                f,
+                "\nnot {wanted}: fewer would change the shape or turn triangles over"
+            )?;
+        }
+        if self.triangles == self.triangles_before {
+            f.write_str("\nall of them: no fewer were asked for")?;
+        }
+        if self.degenerate > 0 {
+            write!(
+                f,
+                "\nleft out: {} triangles with two equal corners",
+                self.degenerate
+            )?;
+        }
+        if let Some(measured) = &self.measured {
+            let figures = &measured.symmetric.figures;
+            write!(
+                f,
+                "\ndistance between both meshes: mean {:.6}, 99.9 % at most {:.6}, largest {:.6}",
+                figures.mean, figures.p99_9, figures.max
+            )?;
+        }
+        Ok(())
     }
 }
 

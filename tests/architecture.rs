@@ -11,14 +11,15 @@ use std::path::Path;
 /// several steps, or of the program.
 const MAY_USE: &[(&str, &str)] = &[
     ("cli", "faults features info page params pipeline report"),
-    ("convert", ""),
+    ("convert", "write"),
     ("faults", ""),
     ("features", ""),
     ("info", "params pipeline"),
     ("page", "info report"),
     ("params", ""),
-    ("pipeline", "features params report"),
+    ("pipeline", "features params report write"),
     ("report", "params"),
+    ("write", ""),
     ("disk/error", ""),
     ("disk/spill", "disk/error disk/workspace"),
     ("disk/workspace", "disk/error"),
@@ -64,7 +65,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ("stages/scanners", "stages/attributes stages/ids"),
     (
         "stages/smooth",
-        "stages/cells stages/levels stages/order stages/spacing stages/tiles",
+        "stages/cells stages/ids stages/levels stages/order stages/spacing stages/tiles",
     ),
     ("stages/spacing", "stages/ids stages/levels"),
     (

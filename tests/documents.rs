@@ -137,6 +137,7 @@ fn of_commands() -> BTreeMap<&'static str, BTreeSet<String>> {
         "info",
         "verify",
         "compare",
+        "simplify",
         "tiles",
         "view",
         "demo",

@@ -136,7 +136,7 @@ impl CallError {
     }
 }
 
-/// Runs `reconstruct`, `resume`, `info`, `verify`, `compare` or `tiles`; `words` are those behind the name of the
+/// Runs `reconstruct`, `resume`, `info`, `verify`, `compare`, `simplify` or `tiles`; `words` are those behind the name of the
 /// program.
 ///
 /// # Errors

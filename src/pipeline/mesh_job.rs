@@ -96,6 +96,7 @@ impl<O: Clone + Serialize> MeshJob<'_, O> {
 
     fn open(&self) -> Result<Workspace> {
         let path = self.scratch();
+        let pool = MemoryPool::new(self.resources.memory())?;
         let manifest = Manifest::of(self)?;
         let bytes = manifest.to_bytes(&path)?;
         let Resources {
@@ -122,7 +123,6 @@ impl<O: Clone + Serialize> MeshJob<'_, O> {
             storage,
             ..
         } = &self.resources;
-        let pool = MemoryPool::new(self.resources.memory())?;
         let threads = self.resources.threads();
         let (observer, cancel) = (observer.clone(), cancel.clone());
         let workspace = Workspace::resumable(folder, pool, threads, observer, cancel)?;

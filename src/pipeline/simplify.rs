@@ -3,16 +3,16 @@
 use super::mesh_job::MeshJob;
 use super::resources::{Resources, resource_setters};
 use super::{Start, start::scratch_folder};
+use crate::report::SimplifyReport;
 use crate::write::{Bounds, write};
 use outcrop_codecs::ply_mesh::{PlyMesh, system};
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::progress::{Cancel, Observer};
 use outcrop_disk::workspace::{Storage, Workspace};
-use outcrop_inspect::compare::{self, Comparison};
+use outcrop_inspect::compare;
 use outcrop_levels::single::{self, Goal, Options, Simplified};
 use outcrop_mesh_files::export::{self, CoordinateType, Mesh, VertexColumn};
 use outcrop_ply::Place;
-use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -26,64 +26,6 @@ pub struct Simplification {
     options: Options,
     samples: u64,
     resources: Resources,
-}
-
-/// What became of a mesh that was simplified.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct SimplifyReport {
-    /// Vertices of the mesh that was read.
-    pub vertices_before: u64,
-    /// Triangles of the mesh that was read.
-    pub triangles_before: u64,
-    /// Vertices of the mesh that was made.
-    pub vertices: u64,
-    /// Triangles of the mesh that was made.
-    pub triangles: u64,
-    /// Triangles of the mesh that was read with two equal corners, which were left out.
-    pub degenerate: u64,
-    /// What was asked for.
-    pub goal: Goal,
-    /// The largest mean distance of a vertex from the planes of the triangles that it stands for.
-    pub error: f64,
-    /// How often all triangles were looked at.
-    pub passes: u32,
-    /// Distances between both meshes, as `compare` measures them: the first is the mesh that was read.
-    pub measured: Option<Comparison>,
-}
-
-impl std::fmt::Display for SimplifyReport {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let part = 100.0 * self.triangles as f64 / self.triangles_before.max(1) as f64;
-        write!(
-            f,
-            "{} of {} triangles ({part:.2} %), {} vertices",
-            self.triangles, self.triangles_before, self.vertices
-        )?;
-        if let Goal::Triangles(wanted) = self.goal
-            && self.triangles > wanted + wanted / 100
-        {
-            write!(
-                f,
-                "\nnot {wanted}: fewer would change the shape or turn triangles over"
-            )?;
-        }
-        if self.degenerate > 0 {
-            write!(
-                f,
-                "\nleft out: {} triangles with two equal corners",
-                self.degenerate
-            )?;
-        }
-        if let Some(measured) = &self.measured {
-            let figures = &measured.symmetric.figures;
-            write!(
-                f,
-                "\ndistance between both meshes: mean {:.6}, 99.9 % at most {:.6}, largest {:.6}",
-                figures.mean, figures.p99_9, figures.max
-            )?;
-        }
-        Ok(())
-    }
 }
 
 impl Simplification {
@@ -208,13 +150,55 @@ impl Simplification {
         let source = PlyMesh::open_any(&self.mesh, workspace)?;
         let mut bounds = Bounds::new(&self.output, made.vertices(), workspace);
         made.read(&mut bounds, workspace)?;
+        let (about, shift) = self.about(&source, made, bounds.corners(), workspace)?;
+        let all = about.bounds.unwrap_or_default();
+        let largest = all.as_flattened().iter();
+        let largest = largest.fold(0.0, |most: f64, x| most.max(x.abs()));
+        let observer = &workspace.observer;
+        for warning in export::left_out(&self.output, &about, largest, &**observer)? {
+            observer.warn(&warning);
+        }
+        write(&self.output, (about, shift), workspace, |writer| {
+            made.read(writer, workspace)
+        })
+    }
+
+    /// The properties of the file, and what its coordinates are less than those of the mesh.
+    fn about(
+        &self,
+        source: &PlyMesh,
+        made: &Simplified,
+        corners: Option<[[f64; 3]; 2]>,
+        workspace: &Workspace,
+    ) -> Result<(Mesh, [f64; 3])> {
         let format = export::format_of(&self.output)?;
+        let [low, high] = corners.unwrap_or_default();
+        // Coordinates of a format without doubles are told from the corner of the mesh, if those of the file are doubles.
+        let is_moved = !source.has_floats() && !format.holds_doubles();
+        let shift = match is_moved {
+            true => low.map(f64::floor),
+            false => [0.0; 3],
+        };
+        if shift != [0.0; 3] {
+            let ([x, y, z], name) = (shift, format.name());
+            workspace.observer.warn(&format!(
+                "{name} holds 32-bit floats: its coordinates are those of the mesh less {x} {y} {z}"
+            ));
+        }
+        let mut comments = system(&self.mesh)?.comments();
+        if source.origin().is_some() || is_moved {
+            let origin = source.origin().unwrap_or_default();
+            let place = [0, 1, 2].map(|k| origin[k] + shift[k]);
+            comments.extend(Place::new(place, None).comments());
+        }
         let columns = source.columns().into_iter();
         let columns = columns.map(|(_, name, scalar)| VertexColumn {
             name: name.to_owned(),
             scalar,
         });
-        let mut about = Mesh {
+        let moved = |corner: [f64; 3]| [0, 1, 2].map(|k| corner[k] - shift[k]);
+        let span = (0..3).fold(1e-9, |most: f64, k| most.max(high[k] - low[k]));
+        let about = Mesh {
             vertices: made.vertices(),
             triangles: made.triangles(),
             coordinates: match source.has_floats() {
@@ -222,37 +206,12 @@ impl Simplification {
                 false => CoordinateType::Double,
             },
             columns: columns.collect(),
-            comments: system(&self.mesh)?.comments(),
-            bounds: bounds.corners(),
+            comments,
+            bounds: corners.map(|corners| corners.map(moved)),
+            // A hundred-millionth of the span, about.
+            decimals: (8.0 - span.log10().ceil()).clamp(0.0, 17.0) as usize,
             ..Mesh::default()
         };
-        let origin = source.origin().unwrap_or_default();
-        // Coordinates of a format without doubles are told from the corner of the mesh, if those of the file are doubles.
-        let [low, high] = bounds.corners().unwrap_or_default();
-        let is_moved = !source.has_floats() && !format.holds_doubles();
-        let shift = if is_moved {
-            low.map(f64::floor)
-        } else {
-            [0.0; 3]
-        };
-        let place = [0, 1, 2].map(|k| origin[k] + shift[k]);
-        if source.origin().is_some() || is_moved {
-            about.comments.extend(Place::new(place, None).comments());
-        }
-        about.bounds = bounds
-            .corners()
-            .map(|corners| corners.map(|corner| [0, 1, 2].map(|k| corner[k] - shift[k])));
-        let span = (0..3).fold(0.0, |most: f64, k| most.max(high[k] - low[k]));
-        about.decimals = (8.0 - span.max(1e-9).log10().ceil()).clamp(0.0, 17.0) as usize;
-        let largest = low
-            .iter()
-            .chain(&high)
-            .fold(0.0, |most: f64, x| most.max(x.abs()));
-        for warning in export::left_out(&self.output, &about, largest, &*workspace.observer)? {
-            workspace.observer.warn(&warning);
-        }
-        write(&self.output, (about, shift), workspace, |writer| {
-            made.read(writer, workspace)
-        })
+        Ok((about, shift))
     }
 }

@@ -50,9 +50,9 @@ impl Tiles {
     /// Makes the tileset.
     ///
     /// # Errors
-    /// [`Error::Input`] for a file that is no mesh of triangles in PLY; [`Error::Parameter`] if the folder has other
-    /// files; [`Error::Memory`] if the budget is too small; [`Error::Io`], [`Error::Disk`], [`Error::Corrupt`],
-    /// [`Error::Cancelled`]; those of an unfinished run, as of [`crate::Reconstruction::run`].
+    /// [`crate::Error::Input`] for a file that is no mesh of triangles in PLY; [`crate::Error::Parameter`] if the folder has other
+    /// files; [`crate::Error::Memory`] if the budget is too small; [`crate::Error::Io`], [`crate::Error::Disk`], [`crate::Error::Corrupt`],
+    /// [`crate::Error::Cancelled`]; those of an unfinished run, as of [`crate::Reconstruction::run`].
     pub fn run(&self) -> Result<TilesReport> {
         outcrop_levels::check_folder(&self.folder)?;
         let job = MeshJob {

@@ -30,8 +30,19 @@ pub(super) struct End {
     pub triangles: usize,
 }
 
-/// An edge in the queue: its cost as bits, which sort as the numbers do; its ends; and the sum of their versions.
-type Queued = Reverse<(u32, u32, u32, u32)>;
+/// An edge in the queue, as one number, by which it sorts: its cost as bits, its ends, and the sum of their versions.
+type Queued = Reverse<u128>;
+
+fn queued(words: [u32; 4]) -> Queued {
+    let number = words
+        .into_iter()
+        .fold(0, |all, word| all << 32 | u128::from(word));
+    Reverse(number)
+}
+
+fn words(Reverse(number): Queued) -> [u32; 4] {
+    [96, 64, 32, 0].map(|shift| (number >> shift) as u32)
+}
 
 struct Queue {
     edges: BinaryHeap<Queued>,
@@ -80,51 +91,49 @@ fn look(patch: &Patch, a: u32, b: u32) -> Option<(f32, u32, u32, V3)> {
 const LENGTH: f64 = 1e-9;
 
 impl Queue {
-    fn push(&mut self, patch: &Patch, a: u32, b: u32) {
-        let Some((cost, ..)) = look(patch, a, b) else {
-            return;
-        };
-        let versions = [a, b].map(|v| self.versions[v as usize]);
-        let sum = versions[0].wrapping_add(versions[1]);
+    /// An edge as it is queued; none if it is not contracted at this cost.
+    fn edge(&self, patch: &Patch, (a, b): (u32, u32), most: f32) -> Option<Queued> {
+        let (cost, ..) = look(patch, a, b)?;
+        let [v, w] = [a, b].map(|v| self.versions[v as usize]);
         // Costs are not negative.
-        self.edges
-            .push(Reverse((cost.max(0.0).to_bits(), a.min(b), a.max(b), sum)));
+        let bits = cost.max(0.0).to_bits();
+        (cost <= most).then(|| queued([bits, a.min(b), a.max(b), v.wrapping_add(w)]))
     }
 
-    fn of(patch: &Patch) -> Self {
+    fn of(patch: &Patch, most: f32) -> Self {
         let mut queue = Self {
-            edges: BinaryHeap::with_capacity(2 * patch.triangles.len()),
+            edges: BinaryHeap::new(),
             versions: vec![0; patch.points.len()],
         };
+        let mut all = Vec::with_capacity(2 * patch.triangles.len());
         for [a, b, c] in &patch.triangles {
             for (a, b) in [(*a, *b), (*b, *c), (*c, *a)] {
-                // An edge is seen from both sides; one that is seen from the larger end only, has one triangle.
+                // Both sides of an edge name it, and one of them in this order. On a boundary it has one side.
                 if a < b || patch.boundary[a as usize] && patch.boundary[b as usize] {
-                    queue.push(patch, a, b);
+                    all.extend(queue.edge(patch, (a, b), most));
                 }
             }
         }
+        queue.edges = BinaryHeap::from(all);
         queue
     }
 }
 
 /// Contracts edges up to an end, and notes what each cost removes.
 pub(super) fn contract(patch: &mut Patch, end: End) -> Curve {
-    let mut queue = Queue::of(patch);
+    let mut queue = Queue::of(patch, end.cost);
     let (mut curve, mut highest) = (Curve::new(), 0f32);
     let mut around = Around::default();
     let (mut fan, mut near) = (Vec::new(), Vec::new());
     while patch.count > end.triangles
-        && let Some(Reverse((bits, a, b, versions))) = queue.edges.pop()
+        && let Some(edge) = queue.edges.pop()
     {
+        let [bits, a, b, versions] = words(edge);
         let known = queue.versions[a as usize].wrapping_add(queue.versions[b as usize]);
         if known != versions {
             continue;
         }
         let cost = f32::from_bits(bits);
-        if !(cost <= end.cost) {
-            break;
-        }
         let Some((_, a, b, place)) = look(patch, a, b) else {
             continue;
         };
@@ -147,7 +156,8 @@ pub(super) fn contract(patch: &mut Patch, end: End) -> Curve {
         patch.fan(a, &mut fan);
         patch.neighbours(a, &fan, &mut near);
         for other in &near {
-            queue.push(patch, a, *other);
+            let edge = queue.edge(patch, (a, *other), end.cost);
+            queue.edges.extend(edge);
         }
     }
     curve

@@ -68,6 +68,9 @@ impl Options {
 struct Columns {
     /// Indices in the file and types.
     wanted: Vec<(usize, Scalar)>,
+    /// True for columns whose values lie between those of both ends of an edge: floats and colours. Of others, such as
+    /// classes, a vertex has the value of the nearer end.
+    blended: Vec<bool>,
     with_quadrics: bool,
 }
 
@@ -88,6 +91,9 @@ impl Stored for Columns {
         }
     }
 }
+
+/// Names of columns of integers that are quantities.
+const BLENDED: [&str; 5] = ["red", "green", "blue", "alpha", "intensity"];
 
 type Intake = intake::Intake<Columns>;
 
@@ -161,9 +167,13 @@ impl<S: Sink> Sink for Whole<S> {
 fn read(path: &Path, workspace: &Workspace) -> Result<(Intake, u64)> {
     workspace.once("read", |unit| {
         let mesh = PlyMesh::open_any(path, workspace)?;
-        let columns = mesh.columns().iter().map(|c| (c.0, c.2)).collect();
+        let all = mesh.columns();
+        let is_blended = |name: &str, scalar: Scalar| {
+            matches!(scalar, Scalar::F32 | Scalar::F64) || BLENDED.contains(&name)
+        };
         let columns = Columns {
-            wanted: columns,
+            wanted: all.iter().map(|c| (c.0, c.2)).collect(),
+            blended: all.iter().map(|c| is_blended(c.1, c.2)).collect(),
             with_quadrics: false,
         };
         let bytes = intake::bytes(&columns, mesh.vertices());

@@ -1,6 +1,6 @@
 //! A pass: the mesh is divided into cells, and each is simplified.
 
-use super::collapse::{Curve, End, contract, left};
+use super::collapse::{Curve, End, contract, cost_of, left};
 use super::kept::Kept;
 use super::patch::{Patch, Vertices};
 use super::quadric::{NUMBERS, Quadric};
@@ -85,6 +85,7 @@ impl<'a> Pass<'a> {
             points: Vec::with_capacity(ids.len()),
             quadrics: Vec::new(),
             values: Vec::new(),
+            blended: columns.blended.clone(),
             locked: vec![false; ids.len()],
         };
         let width = columns.wanted.len();
@@ -181,7 +182,7 @@ impl<'a> Pass<'a> {
             table.put(unit, cell, &rows)?;
             let used = used(&patch);
             sent.send(unit, cell, vertices(&patch, &ids, &used, cell as u32))?;
-            if patch.width > 0 {
+            if patch.width() > 0 {
                 values.send(unit, cell, values_of(&patch, &ids, &used, cell as u32))?;
             }
             unit.advance(self.cells.cells[cell].triangles.into());
@@ -191,7 +192,7 @@ impl<'a> Pass<'a> {
                 vertices: own.count() as u64,
                 cost: curve
                     .last()
-                    .map_or(0.0, |last| super::collapse::cost_of(last.0)),
+                    .map_or(0.0, |last| cost_of(last.0).min(end.cost)),
             })
         };
         let name = (format!("simplify {number}"), "simplify: cells");
@@ -271,7 +272,7 @@ fn vertices(patch: &Patch, ids: &[u32], used: &[u32], cell: u32) -> Vec<KeptVert
 fn values_of(patch: &Patch, ids: &[u32], used: &[u32], cell: u32) -> Vec<KeptValue> {
     let columns = |v: &u32| {
         let (id, v) = (ids[*v as usize], *v as usize);
-        let own = &patch.values[v * patch.width..][..patch.width];
+        let own = &patch.values[v * patch.width()..][..patch.width()];
         own.iter()
             .zip(0u32..)
             .map(move |(value, column)| KeptValue {

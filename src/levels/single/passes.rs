@@ -31,7 +31,7 @@ const PASSES_TO_ERROR: u32 = 4;
 const USEFUL: f64 = 0.98;
 
 /// Cells of which the costs are looked at while there is much to remove, at least.
-const LOOKED_AT: usize = 48;
+const LOOKED_AT: usize = 24;
 
 /// What a pass is to do.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -23,6 +23,8 @@ pub(super) struct Vertices {
     pub quadrics: Vec<Quadric>,
     /// The values of all vertices, one after the other.
     pub values: Vec<f64>,
+    /// True for values that lie between those of both ends of an edge.
+    pub blended: Vec<bool>,
     /// True for vertices that stay where they are.
     pub locked: Vec<bool>,
 }
@@ -32,8 +34,7 @@ pub(super) struct Patch {
     pub points: Vec<V3>,
     pub quadrics: Vec<Quadric>,
     pub values: Vec<f64>,
-    /// Values of a vertex.
-    pub width: usize,
+    blended: Vec<bool>,
     pub locked: Vec<bool>,
     pub boundary: Vec<bool>,
     /// Corners; a triangle that is gone has [`NONE`] as its first.
@@ -84,7 +85,7 @@ impl Patch {
         let count = vertices.points.len();
         let is_first = vertices.quadrics.is_empty();
         let mut patch = Self {
-            width: vertices.values.len() / count.max(1),
+            blended: vertices.blended,
             points: vertices.points,
             quadrics: match is_first {
                 true => vec![Quadric::default(); count],
@@ -380,9 +381,14 @@ impl Patch {
         }
     }
 
-    /// The values at `place`: between those of both ends, as far as it lies along the edge.
+    /// Values of a vertex.
+    pub fn width(&self) -> usize {
+        self.blended.len()
+    }
+
+    /// The values at `place`: between those of both ends, as far as it lies along the edge, or those of the nearer end.
     fn blend(&mut self, at: usize, from: usize, place: V3) {
-        if self.locked[at] || self.width == 0 {
+        if self.locked[at] || self.width() == 0 {
             return;
         }
         let along = minus(self.points[from], self.points[at]);
@@ -391,12 +397,11 @@ impl Patch {
             true => (dot(minus(place, self.points[at]), along) / length2).clamp(0.0, 1.0),
             false => 0.0,
         };
-        for k in 0..self.width {
-            let (old, other) = (
-                self.values[at * self.width + k],
-                self.values[from * self.width + k],
-            );
-            self.values[at * self.width + k] = match part {
+        let width = self.width();
+        for k in 0..width {
+            let part = if self.blended[k] { part } else { part.round() };
+            let (old, other) = (self.values[at * width + k], self.values[from * width + k]);
+            self.values[at * width + k] = match part {
                 0.0 => old,
                 1.0 => other,
                 part => old + part * (other - old),
