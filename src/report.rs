@@ -76,12 +76,17 @@ impl std::fmt::Display for SimplifyReport {
             "{} of {} triangles ({part:.2} %), {} vertices",
             self.triangles, self.triangles_before, self.vertices
         )?;
-        if let outcrop_levels::single::Goal::Triangles(wanted) = self.goal
-            && self.triangles > wanted + wanted / 100
-        {
+        let wanted = match self.goal {
+            outcrop_levels::single::Goal::Triangles(wanted) => wanted,
+            outcrop_levels::single::Goal::Ratio(ratio) => {
+                (ratio * self.triangles_before as f64) as u64
+            }
+            outcrop_levels::single::Goal::Error(_) => u64::MAX,
+        };
+        if self.triangles > wanted.saturating_add(wanted / 50) {
             write!(
                 f,
-                "\nnot {wanted}: fewer would change the shape or turn triangles over"
+                "\nnot {wanted}: components and holes stay, and take triangles"
             )?;
         }
         if self.triangles == self.triangles_before {

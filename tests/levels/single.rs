@@ -174,6 +174,34 @@ fn used(mesh: &Mesh) -> usize {
 }
 
 #[test]
+fn what_stays_does_not_ruin_the_rest() {
+    // Small spheres above hills: each takes four triangles at least.
+    let mut mesh = hills(70, false);
+    let small = sphere(4);
+    for n in 0..30 {
+        let first = mesh.vertices.len() as u32;
+        let at = [635_005.0 + 2.0 * f64::from(n), 4_848_035.0, 130.0];
+        let moved = |p: &[f64; 3]| std::array::from_fn(|k| at[k] + p[k] / 200.0);
+        mesh.vertices.extend(small.vertices.iter().map(moved));
+        let triangles = small.triangles.iter().map(|t| t.map(|v| v + first));
+        mesh.triangles.extend(triangles);
+    }
+    let Made { report, mesh } = made(&mesh, Goal::Ratio(0.001), 1 << 17);
+    let (_, euler) = shape(mesh.vertices.len(), &mesh.triangles);
+    assert_eq!(euler, 1 + 2 * 30);
+    // 120 of the spheres, a few of the ground, and three tenths more.
+    assert!(
+        (150..200).contains(&report.triangles),
+        "{}",
+        report.triangles
+    );
+    assert!(
+        report.to_string().contains("not 15: components"),
+        "{report}"
+    );
+}
+
+#[test]
 fn flat_ground_takes_few_triangles_and_relief_many() {
     // Flat on one side, hills on the other.
     let mut mesh = hills(100, false);

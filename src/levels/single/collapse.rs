@@ -21,10 +21,24 @@ pub(super) fn cost_of(step: u32) -> f32 {
     f32::from_bits(((step + 1) << (23 - STEPS)) - 1)
 }
 
+/// What an edge costs, from the mean squared distance of its vertex from the planes of the triangles that it stands
+/// for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Price {
+    /// This distance.
+    Distance,
+    /// This distance × the root of the area of these triangles: what is far off in a large place is worse than in a
+    /// small one. Against the distance alone, the mean distance of the whole is less by 5 % on statues and by 25 % on a
+    /// town with trees, and the 99.9th percentile is the same; with the area itself instead of its root that percentile
+    /// is up to 40 % larger.
+    DistanceAndArea,
+}
+
 /// When contraction ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct End {
-    /// The largest cost: a mean squared distance from planes.
+    pub price: Price,
+    /// The largest cost.
     pub cost: f32,
     /// The smallest number of triangles.
     pub triangles: usize,
@@ -50,8 +64,18 @@ struct Queue {
     versions: Vec<u32>,
 }
 
-/// The cost of an edge, and the place of its vertex; `a` stays if it is locked. None if both are.
-fn look(patch: &Patch, a: u32, b: u32) -> Option<(f32, u32, u32, V3)> {
+/// An edge that may be contracted.
+struct Look {
+    cost: f32,
+    /// The mean squared distance of the vertex from the planes of the triangles that it stands for.
+    distance2: f64,
+    /// The end that stays in the lists, and the other.
+    ends: [u32; 2],
+    place: V3,
+}
+
+/// Looks at an edge. None if both ends are locked.
+fn look(patch: &Patch, a: u32, b: u32, price: Price) -> Option<Look> {
     let [locked_a, locked_b] = [a, b].map(|v| patch.locked[v as usize]);
     let [rim_a, rim_b] = [a, b].map(|v| patch.boundary[v as usize]);
     let (a, b, fixed) = match (locked_a, locked_b) {
@@ -77,13 +101,22 @@ fn look(patch: &Patch, a: u32, b: u32) -> Option<(f32, u32, u32, V3)> {
     };
     let d = if fixed { [0.0; 3] } else { free() };
     let area = sum.area.max(f64::MIN_POSITIVE);
-    let cost = sum.at(d) / area + LENGTH * length2;
-    let place = if fixed {
-        p
-    } else {
-        std::array::from_fn(|k| p[k] + d[k])
+    let distance2 = sum.at(d) / area;
+    let cost = distance2 + LENGTH * length2;
+    let cost = match price {
+        Price::Distance => cost,
+        Price::DistanceAndArea => cost * area.sqrt(),
     };
-    Some((cost as f32, a, b, place))
+    let place = match fixed {
+        true => p,
+        false => std::array::from_fn(|k| p[k] + d[k]),
+    };
+    Some(Look {
+        cost: cost as f32,
+        distance2,
+        ends: [a, b],
+        place,
+    })
 }
 
 /// The part of the squared length of an edge that is added to its cost, so that short edges go first where the surface
@@ -92,15 +125,15 @@ const LENGTH: f64 = 1e-9;
 
 impl Queue {
     /// An edge as it is queued; none if it is not contracted at this cost.
-    fn edge(&self, patch: &Patch, (a, b): (u32, u32), most: f32) -> Option<Queued> {
-        let (cost, ..) = look(patch, a, b)?;
+    fn edge(&self, patch: &Patch, (a, b): (u32, u32), end: End) -> Option<Queued> {
+        let Look { cost, .. } = look(patch, a, b, end.price)?;
         let [v, w] = [a, b].map(|v| self.versions[v as usize]);
         // Costs are not negative.
         let bits = cost.max(0.0).to_bits();
-        (cost <= most).then(|| queued([bits, a.min(b), a.max(b), v.wrapping_add(w)]))
+        (cost <= end.cost).then(|| queued([bits, a.min(b), a.max(b), v.wrapping_add(w)]))
     }
 
-    fn of(patch: &Patch, most: f32) -> Self {
+    fn of(patch: &Patch, end: End) -> Self {
         let mut queue = Self {
             edges: BinaryHeap::new(),
             versions: vec![0; patch.points.len()],
@@ -110,7 +143,7 @@ impl Queue {
             for (a, b) in [(*a, *b), (*b, *c), (*c, *a)] {
                 // Both sides of an edge name it, and one of them in this order. On a boundary it has one side.
                 if a < b || patch.boundary[a as usize] && patch.boundary[b as usize] {
-                    all.extend(queue.edge(patch, (a, b), most));
+                    all.extend(queue.edge(patch, (a, b), end));
                 }
             }
         }
@@ -119,10 +152,10 @@ impl Queue {
     }
 }
 
-/// Contracts edges up to an end, and notes what each cost removes.
-pub(super) fn contract(patch: &mut Patch, end: End) -> Curve {
-    let mut queue = Queue::of(patch, end.cost);
-    let (mut curve, mut highest) = (Curve::new(), 0f32);
+/// Contracts edges up to an end; notes what each cost removes, and the largest mean squared distance.
+pub(super) fn contract(patch: &mut Patch, end: End) -> (Curve, f64) {
+    let mut queue = Queue::of(patch, end);
+    let (mut curve, mut highest, mut farthest) = (Curve::new(), 0f32, 0f64);
     let mut around = Around::default();
     let (mut fan, mut near) = (Vec::new(), Vec::new());
     while patch.count > end.triangles
@@ -134,15 +167,17 @@ pub(super) fn contract(patch: &mut Patch, end: End) -> Curve {
             continue;
         }
         let cost = f32::from_bits(bits);
-        let Some((_, a, b, place)) = look(patch, a, b) else {
+        let Some(edge) = look(patch, a, b, end.price) else {
             continue;
         };
+        let ([a, b], place) = (edge.ends, edge.place);
         if !patch.can_contract(a, b, &mut around) || !patch.keeps_triangles(a, b, place, &around) {
             continue;
         }
         let before = patch.count;
         patch.contract(a, b, place, &around);
         highest = highest.max(cost);
+        farthest = farthest.max(edge.distance2);
         let (step, removed) = (step(highest), (before - patch.count) as u32);
         match curve.last_mut() {
             Some(last) if last.0 == step => last.1 += removed,
@@ -156,11 +191,11 @@ pub(super) fn contract(patch: &mut Patch, end: End) -> Curve {
         patch.fan(a, &mut fan);
         patch.neighbours(a, &fan, &mut near);
         for other in &near {
-            let edge = queue.edge(patch, (a, *other), end.cost);
+            let edge = queue.edge(patch, (a, *other), end);
             queue.edges.extend(edge);
         }
     }
-    curve
+    (curve, farthest)
 }
 
 /// The triangles that are left.

@@ -1,6 +1,6 @@
 //! A pass: the mesh is divided into cells, and each is simplified.
 
-use super::collapse::{Curve, End, contract, cost_of, left};
+use super::collapse::{Curve, End, contract, left};
 use super::kept::Kept;
 use super::patch::{Patch, Vertices};
 use super::quadric::{NUMBERS, Quadric};
@@ -29,8 +29,8 @@ struct Left {
     triangles: u64,
     /// Without those that belong to an earlier cell.
     vertices: u64,
-    /// The largest cost of a contraction.
-    cost: f32,
+    /// The largest mean squared distance of a vertex from the planes of the triangles that it stands for.
+    distance2: f64,
 }
 
 impl<'a> Pass<'a> {
@@ -139,7 +139,7 @@ impl<'a> Pass<'a> {
                 ..end
             };
             let held = patch.held() as u64;
-            let curve = contract(&mut patch, own);
+            let (curve, _) = contract(&mut patch, own);
             unit.advance(triangles(unit.number()));
             Ok((curve, held))
         };
@@ -161,7 +161,7 @@ impl<'a> Pass<'a> {
     }
 
     /// Simplifies all cells.
-    pub fn simplify(self, end: End, workspace: &Workspace) -> Result<(Kept, f32)> {
+    pub fn simplify(self, end: End, workspace: &Workspace) -> Result<(Kept, f64)> {
         let number = self.number;
         let observer = &workspace.observer;
         observer.begin("simplify", "triangles", self.intake.triangles);
@@ -172,7 +172,7 @@ impl<'a> Pass<'a> {
         let work = |unit: &Unit<'_>| {
             let cell = unit.number();
             let (mut patch, ids, foreign) = self.load(unit, cell)?;
-            let curve = contract(&mut patch, end);
+            let (_, distance2) = contract(&mut patch, end);
             let mut rows: Vec<CellTriangle> = left(&patch)
                 .map(|corners| CellTriangle {
                     corners: least_first(corners.map(|v| ids[v as usize])),
@@ -190,9 +190,7 @@ impl<'a> Pass<'a> {
             Ok(Left {
                 triangles: rows.len() as u64,
                 vertices: own.count() as u64,
-                cost: curve
-                    .last()
-                    .map_or(0.0, |last| cost_of(last.0).min(end.cost)),
+                distance2,
             })
         };
         let name = (format!("simplify {number}"), "simplify: cells");
@@ -205,7 +203,7 @@ impl<'a> Pass<'a> {
             |_, left| {
                 all.triangles += left.triangles;
                 all.vertices += left.vertices;
-                all.cost = all.cost.max(left.cost);
+                all.distance2 = all.distance2.max(left.distance2);
                 Ok(())
             },
         )?;
@@ -221,7 +219,7 @@ impl<'a> Pass<'a> {
             values,
         };
         self.release(workspace)?;
-        Ok((kept, all.cost))
+        Ok((kept, all.distance2))
     }
 
     fn release(self, workspace: &Workspace) -> Result<()> {
