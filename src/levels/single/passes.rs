@@ -115,10 +115,15 @@ fn end(
     let most: u64 = curve.iter().map(|one| u64::from(one.1)).sum();
     let least = looked.saturating_sub(most + held);
     let allowed = most as f64 - SPARE * least as f64;
-    Ok(all(cost(
-        &curve,
-        (part * free as f64).min(allowed).max(0.0) as u64,
-    )))
+    let removed = (part * free as f64).min(allowed).max(0.0) as u64;
+    if pass.cells.cells.len() == 1 {
+        // The only cell can count.
+        return Ok(End {
+            triangles: (triangles - removed) as usize,
+            ..all(f32::MAX)
+        });
+    }
+    Ok(all(cost(&curve, removed)))
 }
 
 /// The mesh that a pass left, read for the next one.
