@@ -133,13 +133,8 @@ impl<'a> Pass<'a> {
         let work = |unit: &Unit<'_>| {
             let cell = unit.number() * step;
             let (mut patch, ..) = self.load(unit, cell)?;
-            let part = end.triangles as f64 * triangles(unit.number()) as f64;
-            let own = End {
-                triangles: (part / self.intake.triangles as f64) as usize,
-                ..end
-            };
             let held = patch.held() as u64;
-            let (curve, _) = contract(&mut patch, own);
+            let (curve, _) = contract(&mut patch, end);
             unit.advance(triangles(unit.number()));
             Ok((curve, held))
         };
