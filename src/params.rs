@@ -12,13 +12,13 @@ use outcrop_disk::error::{Error, Result, Setting};
 use outcrop_disk::workspace::progress::Observer;
 use outcrop_geom::method::METHOD;
 pub use outcrop_geom::region::{NoRegion, Region};
+pub use outcrop_mesh::surface::evidence::Division;
 use outcrop_points::{
     Attributes, Classes, Crop, GivenCrs, IngestStats, Layout, Selection, TextColumns,
 };
 pub use outcrop_stages::normals::InputNormals;
 pub use outcrop_stages::smooth::Smoothing;
 use outcrop_stages::spacing::{Limits, Width};
-pub use outcrop_stages::surface::evidence::Division;
 pub use smooth::Smooth;
 
 /// The variant of the method.

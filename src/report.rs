@@ -10,17 +10,17 @@ pub use outcrop_draw::mesh::Drawn;
 pub use outcrop_draw::picture::Picture;
 #[cfg(feature = "levels")]
 pub use outcrop_levels::TilesReport;
+pub use outcrop_mesh::repair::RepairStats;
+pub use outcrop_mesh::stitch::{BaseStats, InsertStats};
+pub use outcrop_mesh::triples::TripleStats;
 pub use outcrop_mesh_files::cut::CutStats;
 pub use outcrop_mesh_files::export::{CoordinateType, MeshStats};
 pub use outcrop_points::{Attribute, IngestStats};
 pub use outcrop_stages::cells::{CellStats, DiskStats};
 pub use outcrop_stages::normals::NormalStats;
 pub use outcrop_stages::outliers::OutlierStats;
-pub use outcrop_stages::repair::RepairStats;
 pub use outcrop_stages::smooth::RelaxStats;
-pub use outcrop_stages::stitch::{BaseStats, InsertStats};
 pub use outcrop_stages::thin::ThinStats;
-pub use outcrop_stages::triples::TripleStats;
 use serde::Serialize;
 use std::collections::BTreeMap;
 

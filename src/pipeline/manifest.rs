@@ -4,7 +4,7 @@
 use super::{Builder, Reconstruction};
 use crate::params::Params;
 use outcrop_disk::error::{Error, Result};
-use outcrop_stages::surface::evidence::Division;
+use outcrop_mesh::surface::evidence::Division;
 use serde::{Deserialize, Serialize};
 use std::ffi::OsString;
 use std::fs::File;

@@ -22,6 +22,9 @@ use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::course::Course;
 use outcrop_geom::lattice::Lattice;
 use outcrop_geom::method::method_version;
+use outcrop_mesh::repair::{RepairOptions, Repaired, repair};
+use outcrop_mesh::stitch::{StitchOptions, Stitched, stitch};
+use outcrop_mesh::triples::{Triples, triples};
 use outcrop_mesh_files::cut::{CutOptions, StoredPieces, cut};
 use outcrop_mesh_files::export::CoordinateType;
 use outcrop_points::{Attributes, Carried, Column, Spool, ingest_selected};
@@ -30,10 +33,7 @@ use outcrop_stages::cells::{CellTriples, DiskRadius, TileRanges};
 use outcrop_stages::located::Places;
 use outcrop_stages::order::{Orderer, PointStore, StoredPoints, order, sample_sort};
 use outcrop_stages::outliers::{OutlierOptions, drop_outliers};
-use outcrop_stages::repair::{RepairOptions, Repaired, repair};
-use outcrop_stages::stitch::{StitchOptions, Stitched, stitch};
 use outcrop_stages::thin::{Grid, LeftOut, thin};
-use outcrop_stages::triples::{Triples, triples};
 use std::time::Instant;
 
 /// Halvings of the lattice step before points move, so that rounding does not undo the movement. With 5 or 20

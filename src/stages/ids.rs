@@ -20,7 +20,6 @@ pub trait Number: Copy + Ord + Hash + Debug + Default {
 }
 
 /// Plain numbers, for tests.
-#[cfg(test)]
 impl Number for u32 {
     fn at(index: usize) -> Self {
         index as Self
@@ -133,7 +132,7 @@ number! {
 }
 
 number! {
-    /// An edge of a triangle, see [`side`](crate::surface::sides::side).
+    /// An edge of a triangle, see `sides::side` in `outcrop-mesh`.
     Side: u32
 }
 

@@ -4,12 +4,12 @@ use outcrop_disk::error::Result;
 use outcrop_disk::spill::Inbox;
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_disk::workspace::{Unit, Workspace};
+use outcrop_mesh::repair::{ComponentRun, FilledTriangle, Repaired, Surface, Vertices};
 use outcrop_mesh_files::cut::{Pieces, StoredPieces};
 use outcrop_stages::blocks::Blocks;
 use outcrop_stages::ids::{Ids, Triangle};
 use outcrop_stages::located::Located;
 use outcrop_stages::order::PointStore;
-use outcrop_stages::repair::{ComponentRun, FilledTriangle, Repaired, Surface, Vertices};
 
 /// The finished surface, as it is stored.
 #[derive(Debug, Clone, Copy)]

@@ -8,11 +8,11 @@ use outcrop_disk::workspace::Unit;
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_geom::Point;
 use outcrop_geom::triangle::{add, direction, normal};
+use outcrop_mesh::repair::OrientedTriangle;
+use outcrop_mesh::surface::star::{Link, Star, sorted};
 use outcrop_stages::blocks::Blocks;
 use outcrop_stages::ids::{Id, Ids};
 use outcrop_stages::located::Located;
-use outcrop_stages::repair::OrientedTriangle;
-use outcrop_stages::surface::star::{Link, Star, sorted};
 use std::ops::Range;
 
 /// Number of a vertex that is in another block.

@@ -22,10 +22,10 @@ use outcrop_disk::workspace::memory::{Reservation, bytes_of};
 use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_geom::lattice::Lattice;
 use outcrop_geom::region::{Area, Region};
+use outcrop_mesh::repair::{FilledTriangle, Repaired, Surface};
 use outcrop_stages::blocks::Blocks;
 use outcrop_stages::ids::{Block, Id, Triangle};
 use outcrop_stages::order::PointStore;
-use outcrop_stages::repair::{FilledTriangle, Repaired, Surface};
 use serde::{Deserialize, Serialize};
 
 row! {

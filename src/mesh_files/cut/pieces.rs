@@ -8,9 +8,9 @@ use outcrop_disk::spill::{Table, release};
 use outcrop_disk::workspace::memory::Reservation;
 use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_geom::Point;
+use outcrop_mesh::surface::star::sorted;
 use outcrop_stages::blocks::Blocks;
 use outcrop_stages::ids::{Block, Id, Triangle};
-use outcrop_stages::surface::star::sorted;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 

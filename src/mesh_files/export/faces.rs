@@ -5,9 +5,9 @@ use outcrop_disk::error::Result;
 use outcrop_disk::spill::Inbox;
 use outcrop_disk::workspace::Unit;
 use outcrop_disk::workspace::memory::bytes_of;
+use outcrop_mesh::repair::{FilledTriangle, Surface};
+use outcrop_mesh::surface::star::sorted;
 use outcrop_stages::ids::{Id, Ids, Triangle};
-use outcrop_stages::repair::{FilledTriangle, Surface};
-use outcrop_stages::surface::star::sorted;
 
 /// The triangles whose smallest vertex is in a block.
 pub struct Faces<'a> {

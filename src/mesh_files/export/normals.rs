@@ -11,11 +11,11 @@ use outcrop_disk::workspace::Unit;
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_geom::Point;
 use outcrop_geom::triangle::direction as unit_vector;
+use outcrop_mesh::repair::{FilledTriangle, Surface};
+use outcrop_mesh::surface::star::sorted;
 use outcrop_stages::blocks::Blocks;
 use outcrop_stages::ids::{Id, Triangle};
 use outcrop_stages::order::PointStore;
-use outcrop_stages::repair::{FilledTriangle, Surface};
-use outcrop_stages::surface::star::sorted;
 
 /// A sum of doubled area vectors on the lattice. One of them has 62 bits.
 type Sum = [i128; 3];

@@ -5,10 +5,10 @@ use outcrop_disk::error::{Error, Result};
 use outcrop_disk::spill::{Inbox, Shuffle, Table, release, row};
 use outcrop_disk::workspace::memory::Reservation;
 use outcrop_disk::workspace::{Unit, Workspace};
+use outcrop_mesh::repair::{FilledTriangle, NumberingInput, Vertices};
+use outcrop_mesh::surface::star::{Link, Star, Triangle, sorted};
 use outcrop_stages::blocks::Blocks;
 use outcrop_stages::ids::{Block, Id};
-use outcrop_stages::repair::{FilledTriangle, NumberingInput, Vertices};
-use outcrop_stages::surface::star::{Link, Star, Triangle, sorted};
 use serde::{Deserialize, Serialize};
 
 /// The points that are vertices, and the numbers of all vertices and triangles in the file. With the bits of

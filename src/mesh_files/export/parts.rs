@@ -10,10 +10,10 @@ use outcrop_disk::error::Result;
 use outcrop_disk::spill::{Inbox, Table};
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_disk::workspace::{Unit, Workspace};
+use outcrop_mesh::repair::{FilledTriangle, Surface};
 use outcrop_stages::blocks::Blocks;
 use outcrop_stages::ids::{Id, Ids, Triangle};
 use outcrop_stages::order::PointStore;
-use outcrop_stages::repair::{FilledTriangle, Surface};
 
 /// The parts of a mesh. In the file the vertices of all parts come first, then the copies of pinched vertices
 /// of all parts, then their triangles.

@@ -13,10 +13,10 @@ use outcrop_disk::workspace::limits;
 #[cfg(feature = "pages")]
 use outcrop_draw::mesh::{Finished, Subject, draw};
 use outcrop_geom::lattice::Lattice;
+use outcrop_mesh::repair::Repaired;
 use outcrop_mesh_files::cut::StoredPieces;
 use outcrop_stages::blocks::Blocks;
 use outcrop_stages::order::PointStore;
-use outcrop_stages::repair::Repaired;
 
 impl Stages<'_> {
     /// Draws the mesh, if pictures are wanted. What it reads is deleted with the folder: a run that was resumed

@@ -7,6 +7,7 @@ use crate::params::Origin;
 use outcrop_disk::error::{Result, Setting};
 use outcrop_geom::aabb::Aabb;
 use outcrop_geom::lattice::{Lattice, Shift};
+use outcrop_mesh::repair::Repaired;
 use outcrop_mesh_files::cut::StoredPieces;
 use outcrop_mesh_files::export::{
     CoordinateType, ExportOptions, SplitOptions, export, export_cut, export_split,
@@ -15,7 +16,6 @@ use outcrop_ply::Place;
 use outcrop_stages::attributes::StoredColumns;
 use outcrop_stages::blocks::Blocks;
 use outcrop_stages::order::PointStore;
-use outcrop_stages::repair::Repaired;
 
 /// The type of coordinates in the mesh.
 pub(super) fn written(precision: outcrop_points::CoordinateType) -> CoordinateType {
