@@ -59,6 +59,8 @@ pub struct Params {
     pub crop_margin: Option<f64>,
     /// One mesh for each square of this side in x and y, in the input's unit, instead of one for all.
     pub split: Option<f64>,
+    /// The mesh with this number of triangles, or with all it has if these are fewer.
+    pub triangles: Option<u64>,
     /// Columns of the points that the mesh keeps, such as colours.
     pub attributes: Attributes,
     /// Colours with 16 bits instead of 8.
@@ -145,6 +147,7 @@ impl Default for Params {
             crop: None,
             crop_margin: None,
             split: None,
+            triangles: None,
             attributes: Attributes::None,
             wide_colors: false,
             thin: None,
@@ -316,6 +319,15 @@ impl Params {
             && !(side > 0.0 && side.is_finite())
         {
             return error("split", side.to_string(), "a positive length");
+        }
+        if let Some(triangles) = self.triangles {
+            let refuse = |expected| error("triangles", triangles.to_string(), expected);
+            match () {
+                () if triangles == 0 => return refuse("1 or more"),
+                () if self.split.is_some() => return refuse("no mesh in squares at the same time"),
+                () if self.compress_glb => return refuse("no compressed GLB at the same time"),
+                () => {}
+            }
         }
         if let Some(side) = self.thin
             && !(side > 0.0 && side.is_finite())

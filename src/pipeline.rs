@@ -159,8 +159,10 @@ impl Reconstruction {
         let (seen, coarse) = stages.cells(places, radius, &values, tiles)?;
         let places = places.with_coarse(coarse.as_deref());
         let triples = stages.triples(&seen, blocks)?;
+        let supports = stages.kept(&triples);
         let stitched = stages.stitch(places, triples, blocks)?;
         let repaired = stages.repair(places, stitched, blocks)?;
+        stages.confidence(supports, &repaired, blocks, &mut values)?;
         values.release_told(workspace)?;
         side.release(workspace)?;
         let pieces = stages.cut(&store, &repaired, blocks, &lattice)?;
@@ -173,6 +175,7 @@ impl Reconstruction {
             &lattice,
         )?;
         stages.draw(&store, &shape, &repaired, pieces.as_ref(), blocks, &lattice)?;
+        stages.simplify()?;
         stages.levels()?;
         Ok(stages.report())
     }

@@ -21,12 +21,12 @@ pub use outcrop_stages::normals::NormalStats;
 pub use outcrop_stages::outliers::OutlierStats;
 pub use outcrop_stages::smooth::RelaxStats;
 pub use outcrop_stages::thin::ThinStats;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// The levels of detail of a build that makes none.
 #[cfg(not(feature = "levels"))]
-#[derive(Debug, Clone, Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub enum TilesReport {}
 
 #[cfg(not(feature = "levels"))]
@@ -45,7 +45,7 @@ impl std::fmt::Display for TilesReport {
 
 /// What became of a mesh that was simplified.
 #[cfg(feature = "levels")]
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SimplifyReport {
     /// Vertices of the mesh that was read.
     pub vertices_before: u64,
@@ -113,7 +113,7 @@ impl std::fmt::Display for SimplifyReport {
 
 /// The simplified mesh of a build that makes none.
 #[cfg(not(feature = "levels"))]
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub enum SimplifyReport {}
 
 #[cfg(not(feature = "levels"))]
@@ -176,6 +176,8 @@ pub struct Report {
     pub mesh: MeshStats,
     /// Levels of detail, if they were made.
     pub tiles: Option<TilesReport>,
+    /// The mesh with fewer triangles, if it was asked for; `mesh` is then the one of which it was made.
+    pub simplified: Option<SimplifyReport>,
     /// Type of the coordinates in the file.
     pub coordinates: CoordinateType,
     /// The position of the cloud that is the origin of the mesh's coordinates; none if that is the same as the

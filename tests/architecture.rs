@@ -30,6 +30,7 @@ const MAY_USE: &[(&str, &str)] = &[
     ("geom", "geom/kernels geom/method"),
     ("geom/kernels", ""),
     ("geom/method", ""),
+    ("mesh/confidence", "mesh/repair mesh/surface mesh/triples"),
     ("mesh/repair", "mesh/stitch mesh/surface"),
     ("mesh/stitch", "mesh/surface mesh/triples"),
     ("mesh/surface", ""),

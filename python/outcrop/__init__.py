@@ -74,6 +74,7 @@ def reconstruct(
     normals: bool = False,
     compress_glb: bool = False,
     split: Optional[float] = None,
+    triangles: Optional[int] = None,
     drop_classes: Optional[Classes] = None,
     keep_classes: Optional[Classes] = None,
     skip_lines: int = 0,

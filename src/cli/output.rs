@@ -151,8 +151,15 @@ pub fn summary(report: &Report, output: &Path) -> String {
         style::seconds(report.seconds),
         style::bytes(report.peak_resident_bytes),
         style::bytes(report.peak_scratch_bytes),
-    ) + &smoothed(report)
+    ) + &simplified(report)
+        + &smoothed(report)
         + &left_out(report)
+}
+
+/// Lines about the mesh with fewer triangles, if it was asked for.
+fn simplified(report: &Report) -> String {
+    let made = report.simplified.as_ref();
+    made.map_or_else(String::new, |made| format!("\nsimplified: {made}"))
 }
 
 /// A line about the points that were smoothed because they are noisy, if there are any.

@@ -18,6 +18,12 @@ fn encoded(x: f64) -> f64 {
     }
 }
 
+/// The component of 8 bits in sRGB of linear light from 0 to 1.
+#[must_use]
+pub fn byte_of(x: f64) -> u8 {
+    (encoded(x) * 255.0).round() as u8
+}
+
 /// Largest error of a component, in steps of sRGB: rounded it is what it was.
 const ERROR: f64 = 0.3;
 

@@ -4,8 +4,8 @@
 use meshoptimizer_rs::{
     Workspace,
     codec::{
-        IndexEncoding, VertexEncoding, encode_index_buffer, encode_index_sequence,
-        encode_vertex_buffer,
+        Filter, IndexEncoding, Mode, VertexEncoding, decode_buffer_view, encode_index_buffer,
+        encode_index_sequence, encode_vertex_buffer,
     },
 };
 
@@ -34,6 +34,22 @@ pub fn triangles(triangles: &[[u32; 3]]) -> Encoded {
 pub fn sequence(indices: &[u32]) -> Encoded {
     encode_index_sequence(indices, IndexEncoding::DEFAULT, &mut Workspace::default())
         .map_err(failed)
+}
+
+/// Decodes a part of a buffer with the mode and the filter of these names: `count` elements of `stride` bytes.
+///
+/// # Errors
+/// In words, if the bytes are damaged, or the names are none of the extension.
+pub fn decode(
+    (mode, filter): (&str, Option<&str>),
+    (count, stride): (usize, usize),
+    packed: &[u8],
+) -> Result<Vec<u8>, String> {
+    let wrong = |e: meshoptimizer_rs::Error| format!("what cannot be decoded ({e:?})");
+    let mode = Mode::parse(mode).map_err(wrong)?;
+    let filter = Filter::parse(filter.unwrap_or("NONE")).map_err(wrong)?;
+    let mut workspace = Workspace::default();
+    decode_buffer_view(mode, filter, count, stride, packed, &mut workspace).map_err(wrong)
 }
 
 /// Positions in whole steps, as words of four bytes.

@@ -1,11 +1,13 @@
 //! Streaming reader of triangle meshes in PLY files; see [`MeshStream`].
 
+use crate::foreign::{as_ply, is_foreign};
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::compressed::{Beginning, Content};
 use outcrop_ply::{FileError, FixedMesh, Header, MeshStream, Part, Scalar, System};
 use std::fs::File;
 use std::io::BufReader;
+use std::os::unix::fs::FileExt;
 use std::path::Path;
 
 pub use outcrop_ply::{NO_VERTEX, SLICE};
@@ -48,16 +50,27 @@ pub struct PlyMesh {
     _content: Option<Content>,
 }
 
-/// True for a PLY file whose header has faces: a mesh and not a cloud. False for other files and for headers
-/// that cannot be read; their readers report the error.
+/// True for a PLY file whose header has faces, and for the other formats of meshes: a mesh and not a cloud. False for
+/// other files and for headers that cannot be read; their readers report the error.
 ///
 /// # Errors
 /// [`Error::Io`].
 pub fn holds_faces(path: &Path) -> Result<bool> {
-    let compressed = match Beginning::of(path, &is_ply, Header::LONGEST) {
+    let compressed = match Beginning::of(path, &is_mesh, Header::LONGEST) {
         Err(Error::Input { .. }) => return Ok(false),
         beginning => beginning?,
     };
+    let mut head = [0; 4];
+    if let Some(beginning) = &compressed {
+        let known = beginning.bytes.len().min(head.len());
+        head[..known].copy_from_slice(&beginning.bytes[..known]);
+    } else {
+        let file = File::open(path).map_err(|e| Error::io(path, "open", e))?;
+        let _short = file.read_exact_at(&mut head, 0);
+    }
+    if is_foreign(path, &head) {
+        return Ok(true);
+    }
     let Some(beginning) = compressed else {
         return MeshStream::holds_faces(path).map_err(converted);
     };
@@ -65,9 +78,9 @@ pub fn holds_faces(path: &Path) -> Result<bool> {
     Ok(header.is_ok_and(|header| header.holds_faces()))
 }
 
-/// True for the first bytes of a PLY file.
-fn is_ply(_: &Path, head: &[u8], _: bool) -> bool {
-    head.starts_with(b"ply")
+/// True for the name and the first bytes of a mesh.
+fn is_mesh(path: &Path, head: &[u8], _: bool) -> bool {
+    head.starts_with(b"ply") || is_foreign(path, head)
 }
 
 /// The reference system in the comments of a mesh; nothing of a file whose header cannot be read: its readers report
@@ -76,7 +89,7 @@ fn is_ply(_: &Path, head: &[u8], _: bool) -> bool {
 /// # Errors
 /// [`Error::Io`].
 pub fn system(path: &Path) -> Result<System> {
-    let compressed = match Beginning::of(path, &is_ply, Header::LONGEST) {
+    let compressed = match Beginning::of(path, &is_mesh, Header::LONGEST) {
         Err(Error::Input { .. }) => return Ok(System::default()),
         beginning => beginning?,
     };
@@ -88,23 +101,6 @@ pub fn system(path: &Path) -> Result<System> {
         }
     };
     Ok(header.map(|header| header.system).unwrap_or_default())
-}
-
-/// Extensions of meshes that the program writes and does not read.
-const NOT_READ: [&str; 3] = ["obj", "stl", "glb"];
-
-/// A clearer error for a mesh in a format that the program writes and does not read.
-pub fn clearer(path: &Path, error: Error) -> Error {
-    let name = path.to_string_lossy().to_ascii_lowercase();
-    let name = name.strip_suffix(".zst").unwrap_or(&name);
-    let extension = name.rsplit_once('.').map_or("", |(_, extension)| extension);
-    match error {
-        Error::Input { .. } if NOT_READ.contains(&extension) => {
-            let found = extension.to_ascii_uppercase();
-            Error::input(path, "format", found, "PLY: of meshes only PLY is read")
-        }
-        other => other,
-    }
 }
 
 impl PlyMesh {
@@ -119,18 +115,24 @@ impl PlyMesh {
         })
     }
 
-    /// As [`PlyMesh::open`], also for a compressed file; its content is read from the scratch folder.
+    /// As [`PlyMesh::open`], also for a compressed file, and for meshes in OBJ, STL and GLB; their content is read from
+    /// the scratch folder.
     ///
     /// # Errors
     /// See [`PlyMesh::open`] and [`Content::of`].
     pub fn open_any(path: &Path, workspace: &Workspace) -> Result<Self> {
-        let Some(content) = Content::of(path, &is_ply, workspace)? else {
-            return Self::open(path).map_err(|e| clearer(path, e));
-        };
-        let stream = MeshStream::open_as(&content.path, path);
-        let stream = stream.map_err(|e| clearer(path, converted(e)))?;
-        let _content = Some(content);
-        Ok(Self { stream, _content })
+        let content = Content::of(path, &is_mesh, workspace)?;
+        let plain = content.as_ref().map_or(path, |content| &content.path);
+        if let Some(ply) = as_ply(path, plain, workspace)? {
+            let stream = MeshStream::open_as(&ply, path).map_err(converted)?;
+            let _content = None;
+            return Ok(Self { stream, _content });
+        }
+        let stream = MeshStream::open_as(plain, path).map_err(converted)?;
+        Ok(Self {
+            stream,
+            _content: content,
+        })
     }
 
     /// Number of vertices; at most [`NO_VERTEX`], so that indices fit `u32`.

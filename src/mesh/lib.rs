@@ -19,4 +19,6 @@ pub mod stitch;
 
 pub mod repair;
 
+pub mod confidence;
+
 pub mod surface;

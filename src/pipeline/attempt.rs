@@ -98,6 +98,9 @@ impl Reconstruction {
                 levels::remove_unfinished(tiles);
                 beside::remove(&self.mesh);
             }
+            if self.params.triangles.is_some() {
+                let _ = std::fs::remove_file(&self.mesh);
+            }
             if self.params.split.is_some() {
                 export::remove_unfinished(&self.mesh);
             }

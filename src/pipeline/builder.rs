@@ -114,7 +114,9 @@ impl Builder {
             return missing("output", "the path of the mesh");
         }
         let tiles = levels::folder(&self.output, self.params.split.is_some())?;
-        let mesh = tiles.as_deref().map(mesh_of);
+        let simplified = levels::simplified(&self.output, &self.params, tiles.is_some())?;
+        let target = tiles.as_deref().unwrap_or(&self.output);
+        let mesh = (tiles.is_some() || simplified).then(|| mesh_of(target));
         let named = mesh.as_deref().unwrap_or(&self.output);
         if self.folder.is_some() && check_name(named, true).is_err() {
             // An unfinished run whose mesh was a GLB, and is to be another now.
@@ -122,7 +124,6 @@ impl Builder {
         }
         check_name(named, self.params.compress_glb)?;
         let resources = self.resources;
-        let target = tiles.as_deref().unwrap_or(&self.output);
         let folder = scratch_folder(target, resources.scratch.as_deref());
         Ok(Reconstruction {
             goes_on: self.folder.is_some(),
@@ -146,12 +147,12 @@ impl Builder {
     }
 }
 
-/// The mesh from which a tileset is made.
-fn mesh_of(folder: &Path) -> PathBuf {
+/// The mesh from which a tileset, or one with fewer triangles, is made.
+fn mesh_of(target: &Path) -> PathBuf {
     let mut name = std::ffi::OsString::from(".");
-    name.push(folder.file_name().unwrap_or_default());
+    name.push(target.file_name().unwrap_or_default());
     name.push(".outcrop-mesh.ply");
-    folder.with_file_name(name)
+    target.with_file_name(name)
 }
 
 /// The builder of the unfinished run that was found in a scratch folder.

@@ -53,12 +53,12 @@ pub(crate) const SCANNER: u64 = 4;
 /// Bytes of a normal that a point brings.
 pub(crate) const NORMAL: u64 = outcrop_points::NORMAL_BYTES as u64;
 
-/// Bytes that tell how far a point moved, if the mesh has them.
-pub(crate) fn displaced(attributes: &Attributes) -> u64 {
-    match attributes.has_displacement() {
-        true => size_of::<f32>() as u64,
-        false => 0,
-    }
+/// Bytes that tell how far a point moved, and how well a vertex is supported, if the mesh has them.
+pub(crate) fn made(attributes: &Attributes) -> u64 {
+    let has = [attributes.has_displacement(), attributes.has_confidence()];
+    has.map(|has| u64::from(has) * size_of::<f32>() as u64)
+        .iter()
+        .sum()
 }
 
 /// Part of the points in headers that are certainly different: duplicates are not known before they are read.
@@ -147,7 +147,7 @@ impl Known {
             probes.push(probe);
         }
         known.points = known.read;
-        known.values += displaced(&selection.attributes);
+        known.values += made(&selection.attributes);
         known.double = double(&probes);
         Some(known)
     }

@@ -64,6 +64,9 @@ pub(super) fn plan(
     add("triples", TRIPLES);
     add("stitch", STITCH);
     add("repair", REPAIR);
+    if params.attributes.has_confidence() {
+        add("confidence", DISPLACEMENT);
+    }
     if params.crop.is_some() || params.split.is_some() {
         add("cut", CUT);
     }

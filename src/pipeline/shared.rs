@@ -98,6 +98,14 @@ impl Reconstruction {
                 expected: "a mesh; `outcrop tiles` makes levels of detail of it afterwards".into(),
             });
         }
+        if let Some(triangles) = self.params.triangles {
+            return Err(Error::Parameter {
+                name: "triangles",
+                found: triangles.to_string(),
+                expected: "a whole mesh; `outcrop simplify` makes a smaller one of it afterwards"
+                    .into(),
+            });
+        }
         writable(&self.mesh)?;
         not_an_input(&self.mesh, self.params.split.is_some(), &self.inputs)?;
         one_system(&self.params, &self.inputs)?;

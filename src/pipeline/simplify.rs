@@ -109,7 +109,8 @@ impl Simplification {
         }
     }
 
-    fn make(&self, workspace: &Workspace) -> Result<SimplifyReport> {
+    /// Makes the mesh in a workspace.
+    pub(super) fn make(&self, workspace: &Workspace) -> Result<SimplifyReport> {
         let made = single::simplify(&self.mesh, &self.options, workspace)?;
         let observer = &workspace.observer;
         observer.begin("write", "triangles", made.triangles());
@@ -118,10 +119,11 @@ impl Simplification {
         let measured = match self.samples {
             0 => None,
             samples
-                if self
-                    .output
-                    .extension()
-                    .is_some_and(|e| e.eq_ignore_ascii_case("ply")) =>
+                if self.output.extension().is_some_and(|e| {
+                    ["ply", "obj"]
+                        .iter()
+                        .any(|read| e.eq_ignore_ascii_case(read))
+                }) =>
             {
                 let options = compare::Options { samples, seed: 0 };
                 Some(compare::compare(

@@ -2,6 +2,7 @@
 //! following stages.
 
 mod cells;
+mod confidence;
 mod draw;
 mod export;
 mod moved;
@@ -12,7 +13,7 @@ mod values;
 mod warnings;
 
 use super::checks::{all_are_kept, disk_radius, enough, room};
-use super::disk::{DISTINCT, NORMAL, SCANNER, SURE, Text, displaced};
+use super::disk::{DISTINCT, NORMAL, SCANNER, SURE, Text, made};
 use super::{Clock, Known, Reconstruction};
 use crate::params::Method;
 use crate::report::{LatticeReport, Report};
@@ -188,7 +189,7 @@ impl<'a> Stages<'a> {
             decompressed: 0,
             // With thinning, the number of points that stay is unknown.
             points: if params.thin.is_some() { 0 } else { input.kept },
-            values: self.carried.bytes() as u64 - scanner - normal + displaced(&params.attributes),
+            values: self.carried.bytes() as u64 - scanner - normal + made(&params.attributes),
             scanner,
             normal,
             double: Some(self.report.coordinates == CoordinateType::Double),
@@ -264,6 +265,8 @@ impl<'a> Stages<'a> {
         let mut columns = self.carried.columns.clone();
         let displaced = job.params.attributes.has_displacement();
         columns.extend(displaced.then(Column::displacement));
+        let confident = job.params.attributes.has_confidence();
+        columns.extend(confident.then(Column::confidence));
         let (shift, coordinates) = self.shift(store.bounds(), lattice)?;
         let place = (coordinates, shift.map_or([0.0; 3], |shift| shift.origin));
         for warning in self.known.left_out(job, &columns, place)? {
@@ -331,6 +334,7 @@ impl<'a> Stages<'a> {
         let options = StitchOptions {
             cos_max_angle: params.cos_max_angle(),
             weigh: (params.method == Method::Robust).then_some(params.division),
+            keep_triples: params.attributes.has_confidence(),
         };
         let items = 3 * blocks.count() as u64;
         let (stitched, base, insertion) = self.clock.stage("stitch", "blocks", items, || {

@@ -26,6 +26,12 @@ pub(super) const NO_SCANNER: u16 = u16::MAX;
 /// How far a point moved from where it was measured, in the cloud's unit: of the mesh, not of a file.
 pub(super) const DISPLACEMENT: &str = "displacement";
 
+/// How well a vertex is supported, from 0 to 1: of the mesh, not of a file.
+pub(super) const CONFIDENCE: &str = "confidence";
+
+/// The names of columns that are made.
+const MADE: [&str; 2] = [DISPLACEMENT, CONFIDENCE];
+
 /// Other names of columns, in lower case.
 const ALIASES: [(&str, &str); 12] = [
     ("r", "red"),
@@ -79,6 +85,12 @@ impl Column {
     pub fn displacement() -> Self {
         Self::new(DISPLACEMENT, Scalar::F32)
     }
+
+    /// How well a vertex is supported.
+    #[must_use]
+    pub fn confidence() -> Self {
+        Self::new(CONFIDENCE, Scalar::F32)
+    }
 }
 
 /// The name by which a column is known in all formats: in lower case, with `_` for spaces, which PLY has between
@@ -124,13 +136,23 @@ impl Attributes {
     /// True if the mesh tells how far each point moved.
     #[must_use]
     pub fn has_displacement(&self) -> bool {
-        matches!(self, Self::List(names) if names.iter().any(|name| name == DISPLACEMENT))
+        self.lists(DISPLACEMENT)
+    }
+
+    /// True if the mesh tells how well each vertex is supported.
+    #[must_use]
+    pub fn has_confidence(&self) -> bool {
+        self.lists(CONFIDENCE)
+    }
+
+    fn lists(&self, name: &str) -> bool {
+        matches!(self, Self::List(names) if names.iter().any(|listed| listed == name))
     }
 
     /// True for the column `name` of a file.
     pub(super) fn wants(&self, name: &str) -> bool {
         match self {
-            _ if name == DISPLACEMENT => false,
+            _ if MADE.contains(&name) => false,
             Self::None => false,
             Self::Auto => COLORS.contains(&name) || name == INTENSITY || name == CLASSIFICATION,
             Self::List(names) => names.iter().any(|n| n == name),
@@ -151,7 +173,7 @@ impl Attributes {
             Self::Auto => [&COLORS[..], &[INTENSITY, CLASSIFICATION]].concat(),
             Self::List(names) => {
                 let names = names.iter().map(String::as_str);
-                names.filter(|name| *name != DISPLACEMENT).collect()
+                names.filter(|name| !MADE.contains(name)).collect()
             }
         }
     }

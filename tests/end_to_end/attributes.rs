@@ -177,13 +177,13 @@ fn bytes_do_not_depend_on_how_it_was_run() {
     }
 }
 
-/// The displacements of the vertices of a mesh with only this column, in coordinates of double precision.
-fn displacements(path: &Path) -> Vec<f32> {
+/// The values of the vertices of a mesh with only this column, of floats, in coordinates of double precision.
+fn values(path: &Path, column: &str) -> Vec<f32> {
     let bytes = std::fs::read(path).unwrap();
     let end = bytes.windows(11).position(|w| w == b"end_header\n");
     let (header, rows) = bytes.split_at(end.unwrap() + 11);
     let header = std::str::from_utf8(header).unwrap();
-    assert!(header.contains("double z\nproperty float displacement\nelement face"));
+    assert!(header.contains(&format!("double z\nproperty float {column}\nelement face")));
     let count = header.split("element vertex ").nth(1).unwrap();
     let count: usize = count.lines().next().unwrap().parse().unwrap();
     let rows = rows.as_chunks::<28>().0.iter().take(count);
@@ -207,7 +207,7 @@ fn displacement_tells_how_far_each_point_moved() {
             ..Params::default()
         };
         let report = util::reconstruct(input, &mesh, &params);
-        (report, displacements(&mesh))
+        (report, values(&mesh, "displacement"))
     };
     for (input, smooth) in [(&clean, Smooth::Auto), (&noisy, Smooth::Rounds(0))] {
         let (report, moved) = run(input, smooth);
@@ -233,15 +233,56 @@ fn displacement_tells_how_far_each_point_moved() {
     assert!(twice.iter().filter(|length| **length > 0.0).count() > 18_000);
 }
 
+/// Where all cells agree the confidence is 1; noise and filled holes lower it.
 #[test]
-fn displacement_comes_behind_other_columns_in_any_division() {
+fn confidence_is_the_share_of_cells_that_agree() {
+    let bench = Bench::new();
+    let mesh = bench.path("mesh.ply");
+    let run = |input: &Path| {
+        let params = Params {
+            attributes: "confidence".parse().unwrap(),
+            ..Params::default()
+        };
+        let report = util::reconstruct(input, &mesh, &params);
+        (report, values(&mesh, "confidence"))
+    };
+    let cloud = |noise| {
+        let cloud = Cloud::new(Kind::Bumpy).points(20_000);
+        bench.cloud(&format!("{noise}.ply"), &cloud.noise(noise).seed(5))
+    };
+    let mean = |all: &[f32]| all.iter().map(|x| f64::from(*x)).sum::<f64>() / all.len() as f64;
+    let (report, clean) = run(&cloud(0.0));
+    let [least, most] = report.attributes[0].range;
+    assert!(
+        clean
+            .iter()
+            .all(|x| (least as f32..=most as f32).contains(x))
+    );
+    assert!(least > 0.0 && most == 1.0);
+    assert!(mean(&clean) > 0.97, "{}", mean(&clean));
+    let (_, noisy) = run(&cloud(5.0));
+    assert!(mean(&noisy) < mean(&clean) - 0.02, "{}", mean(&noisy));
+
+    // A flat grid without one point has one narrow hole, whose rim is all that is less than sure inside.
+    let points = (0..400)
+        .map(|n| [n % 20, n / 20])
+        .filter(|p| *p != [10, 10]);
+    let points: Vec<_> = points.map(|[x, y]| [x, y, 0].map(f64::from)).collect();
+    let (report, flat) = run(&bench.points("grid.xyz", &points));
+    assert_eq!(flat.len(), 399);
+    assert_eq!(report.repair.holes_filled, 1);
+    assert!(flat.iter().filter(|x| **x < 0.99).count() < 399 / 2);
+}
+
+#[test]
+fn columns_that_are_made_come_behind_others_in_any_division() {
     let bench = Bench::new();
     let input = write(&bench, "cloud.ply", &cloud(20_000));
     let mesh = bench.path("mesh.ply");
     let mut hashes = Vec::new();
     for (threads, tile, memory) in [(1, 500, MINIMUM_BUDGET), (4, 3000, 300 << 20)] {
         let params = Params {
-            attributes: "displacement,level".parse().unwrap(),
+            attributes: "confidence,displacement,level".parse().unwrap(),
             block: 3000,
             ..Params::default()
         };
@@ -249,7 +290,7 @@ fn displacement_comes_behind_other_columns_in_any_division() {
         let run = run.threads(threads).tile_points(tile).memory(memory);
         let report = run.build().unwrap().run().unwrap();
         let names: Vec<_> = report.attributes.iter().map(|a| &*a.name).collect();
-        assert_eq!(names, ["level", "displacement"]);
+        assert_eq!(names, ["level", "displacement", "confidence"]);
         hashes.push(util::hash(&mesh));
     }
     assert_eq!(hashes[0], hashes[1]);

@@ -214,6 +214,60 @@ fn cloud(path: &Path) {
 }
 
 #[test]
+fn a_cloud_becomes_a_small_mesh_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    cloud(&at("scan.xyz"));
+    let run = |output: &str, triangles| {
+        let params = outcrop::Params {
+            triangles,
+            ..outcrop::Params::default()
+        };
+        let run = outcrop::Reconstruction::builder()
+            .input(at("scan.xyz"))
+            .output(at(output))
+            .params(params);
+        run.memory(192 << 20).threads(2).start(Start::Resume)
+    };
+    run("mesh.ply", None).build().unwrap().run().unwrap();
+    let goal = outcrop::levels::single::Goal::Triangles(1000);
+    outcrop::Simplification::new(at("mesh.ply"), at("want.ply"), goal)
+        .memory(192 << 20)
+        .run()
+        .unwrap();
+    let cancel = Cancel::new();
+    let observer = Arc::new(Stop {
+        left: AtomicU64::new(60_000),
+        cancel: cancel.clone(),
+    });
+    let small = || run("small.ply", Some(1000));
+    let stopped = small().observer(observer).cancel(cancel).build().unwrap();
+    assert!(matches!(stopped.run().unwrap_err(), Error::Cancelled));
+    let report = small().build().unwrap().run().unwrap();
+    let made = report.simplified.unwrap();
+    assert_eq!(made.triangles_before, report.mesh.triangles);
+    assert!((990..=1000).contains(&made.triangles));
+    let bytes = |name| std::fs::read(at(name)).unwrap();
+    assert!(bytes("small.ply") == bytes("want.ply"));
+    // Nothing else is left.
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 4);
+    for (output, triangles) in [
+        ("small.ply", 0),
+        ("small.ply.zst", 9),
+        ("town/tileset.json", 9),
+        ("small.txt", 9),
+    ] {
+        let refused = run(output, Some(triangles)).build();
+        let refused = refused.and_then(|run| run.run());
+        assert!(matches!(refused, Err(Error::Parameter { .. })), "{output}");
+    }
+    assert!(matches!(
+        small().build().unwrap().plan(2),
+        Err(Error::Parameter { .. })
+    ));
+}
+
+#[test]
 fn a_cloud_becomes_the_tileset_of_its_mesh() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);

@@ -124,6 +124,7 @@ fn pipeline(
     let extraction = StitchOptions {
         cos_max_angle: settings.cos_max_angle,
         weigh: settings.robust.then_some(division),
+        keep_triples: false,
     };
     let (stitched, base, inserted) = stitch(places, triples, blocks, extraction, workspace)?;
     let options = RepairOptions {

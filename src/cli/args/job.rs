@@ -1,6 +1,6 @@
 //! The points, the mesh, and what decides it.
 
-use super::super::parse::{region, system};
+use super::super::parse::{count, region, system};
 use crate::params::{
     Facing, InputNormals, MaxWidth, Method, Origin, Params, Radius, Region, Smooth, Smoothing,
 };
@@ -54,7 +54,8 @@ pub struct Points {
 pub struct Columns {
     /// Keep the points' own values at the vertices: auto (colours, intensity and classification, unless they are
     /// the same everywhere), none, or a list of columns by name like color,intensity,gps_time; displacement is how
-    /// far smoothing moved each point
+    /// far smoothing moved each point, confidence from 0 to 1 how many of the cells around a vertex agree on its
+    /// triangles
     #[arg(long, value_name = "auto|none|LIST", default_value = "none")]
     pub attributes: Attributes,
     /// Write colours with 16 bits instead of 8
@@ -237,6 +238,9 @@ pub struct Job {
     /// MESH.index.json with a list of them
     #[arg(long, value_name = "LENGTH")]
     pub split: Option<f64>,
+    /// Simplify the mesh to this number of triangles, e.g. 2e6, as `outcrop simplify` does
+    #[arg(long, value_name = "N", value_parser = count)]
+    pub triangles: Option<u64>,
     #[command(flatten)]
     pub points: Points,
     #[command(flatten)]
@@ -281,6 +285,7 @@ impl Job {
             crop: selected.crop,
             crop_margin: selected.crop_margin,
             split: self.split,
+            triangles: self.triangles,
             attributes: self.columns.attributes.clone(),
             wide_colors: self.columns.wide_colors,
             thin: self.filters.thin,

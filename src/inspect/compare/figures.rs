@@ -6,7 +6,7 @@ use outcrop_disk::error::Result;
 use outcrop_disk::spill::{Sorter, row};
 use outcrop_disk::workspace::Workspace;
 use outcrop_geom::vector::V3;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// Directions: of the first side, of the second, of both.
@@ -16,7 +16,7 @@ const WAYS: usize = 3;
 const SHARES: [u64; 4] = [500, 900, 990, 999];
 
 /// Distances over one set of samples, in the unit of the files or in per cent.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Figures {
     /// The maximum over all samples.
     pub max: f64,
@@ -35,7 +35,7 @@ pub struct Figures {
 }
 
 /// Distances in one direction, or in both.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Distances {
     /// Places where the distance was taken.
     pub samples: u64,
@@ -51,7 +51,7 @@ pub struct Distances {
 }
 
 /// Distances between two shapes.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Comparison {
     /// The first side.
     pub a: Side,

@@ -38,7 +38,7 @@ pub use shape::{Kind, Side};
 #[cfg(feature = "pictures")]
 use drawing::{Drawing, Sketch};
 use figures::Sums;
-use outcrop_codecs::ply_mesh::{PlyMesh, clearer, holds_faces};
+use outcrop_codecs::ply_mesh::{PlyMesh, holds_faces};
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::Workspace;
 #[cfg(feature = "pictures")]
@@ -82,7 +82,7 @@ fn read_side(
             workspace,
         )
     } else {
-        cloud::read(path, name, workspace).map_err(|e| clearer(path, e))
+        cloud::read(path, name, workspace)
     }
 }
 

@@ -4,14 +4,14 @@ use super::pages::Pages;
 use outcrop_disk::error::Error;
 use outcrop_disk::spill::LocalTable;
 use outcrop_geom::vector::{Box3, V3};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// Largest coordinate for which no product of four lengths overflows.
 const LARGEST: f64 = 1e70;
 
 /// Description of one side.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Side {
     /// The file or folder.
     pub path: PathBuf,
@@ -33,7 +33,7 @@ pub struct Side {
 }
 
 /// Mesh or cloud.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
     /// Triangles: distances are to the nearest point of the surface.

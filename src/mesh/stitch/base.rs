@@ -2,6 +2,7 @@
 //! first part).
 
 use super::BaseStats;
+use super::StitchOptions;
 use crate::surface::evidence::{Division, Evidence, UP, Witness};
 use crate::surface::orient::{BlockTriangles, Oriented, orient_inside};
 use crate::surface::rows::TriangleTo;
@@ -51,14 +52,14 @@ pub(super) fn base(
     places: Places<'_>,
     triples: &Triples,
     blocks: Blocks,
-    division: Option<Division>,
+    options: StitchOptions,
     workspace: &Workspace,
 ) -> Result<(Base, BaseStats)> {
     let count = blocks.count();
     let visiting = triples.visiting.open(workspace, count)?;
     let highest = |unit: &Unit<'_>| extreme(places.shape, Direction::UP, blocks, unit);
     let up = !places.outside.is_some_and(|outside| outside.is_for_all());
-    let by_evidence = match division {
+    let by_evidence = match options.weigh {
         Some(division) if up => Some((division, Some(workspace.once("columns", highest)?))),
         Some(division) => Some((division, None)),
         None => None,
@@ -95,7 +96,9 @@ pub(super) fn base(
     })?;
     let start = std::time::Instant::now();
     let flags = look.flags.open(workspace, count)?.unique();
-    triples.own.release(workspace)?;
+    if !options.keep_triples {
+        triples.own.release(workspace)?;
+    }
     let (surface, flagged) = workspace.once("join", |unit| {
         let counts = (0..count).map(|block| Ok(flags.get(unit, block)?.len() as u64));
         let flagged: u64 = counts.sum::<Result<_>>()?;

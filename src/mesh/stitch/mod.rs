@@ -53,6 +53,8 @@ pub struct StitchOptions {
     pub cos_max_angle: f64,
     /// The division for orientation by evidence; `None` orients in the order of triangles.
     pub weigh: Option<Division>,
+    /// True if others need the files of the triples afterwards.
+    pub keep_triples: bool,
 }
 
 /// Input and output of the insertion of candidates.
@@ -66,7 +68,7 @@ struct Insertion<'a> {
     workspace: &'a Workspace,
 }
 
-/// Extracts the manifold. Deletes the files of `triples` on the way: nobody else has them.
+/// Extracts the manifold. Deletes the files of `triples` on the way, unless they are to be kept.
 ///
 /// # Errors
 /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`], [`outcrop_disk::error::Error::Memory`],
@@ -78,7 +80,7 @@ pub fn stitch(
     options: StitchOptions,
     workspace: &Workspace,
 ) -> Result<(Stitched, BaseStats, InsertStats)> {
-    let (base, mut counts) = base::base(places, &triples, blocks, options.weigh, workspace)?;
+    let (base, mut counts) = base::base(places, &triples, blocks, options, workspace)?;
     let interior = Interior::new(blocks.count());
     // The pass across blocks is short, and starts from the beginning when the run is resumed.
     let (stitched, inserted, cut) = workspace.once("insert", |unit| {
@@ -100,7 +102,9 @@ pub fn stitch(
     counts.mobius += cut;
     counts.triangles -= cut;
     base.release(workspace)?;
-    triples.visiting.release(workspace)?;
+    if !options.keep_triples {
+        triples.visiting.release(workspace)?;
+    }
     interior.release(workspace)?;
     Ok((stitched, counts, inserted))
 }

@@ -1,7 +1,7 @@
 //! Distinct triples with their counts, by block: the sums over the cells of all tiles (paper, 3.4).
 
 use outcrop_disk::error::Result;
-use outcrop_disk::spill::{Shuffle, Table, row};
+use outcrop_disk::spill::{Shuffle, Table, release, row};
 use outcrop_disk::workspace::memory::{Reservation, bytes_of};
 use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_stages::blocks::Blocks;
@@ -23,13 +23,15 @@ row! {
 }
 
 /// All triples with their counts, ascending.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Triples {
     /// Triples by the block of their smallest vertex.
     pub own: Table<CountedTriple>,
     /// Crossing triples, sent to each other block that contains one of their vertices.
     pub visiting: Shuffle<VisitingTriple>,
 }
+
+release!(Triples: own, visiting);
 
 /// Distinct triples by count.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, PartialEq, Eq)]

@@ -113,7 +113,11 @@ impl Stages<'_> {
         self.report.mesh = self.clock.stage("export", "blocks", items, write)?;
         columns.map_or(Ok(()), |columns| columns.release(workspace))?;
         let wkt = self.wkt.as_deref();
-        let warnings = beside::write(&job.mesh, &job.inputs, &self.report, wkt)?;
+        let named = match job.params.triangles {
+            Some(_) => &job.output,
+            None => &job.mesh,
+        };
+        let warnings = beside::write(named, &job.inputs, &self.report, wkt)?;
         warnings.into_iter().for_each(|warning| self.warn(warning));
         Ok(())
     }
@@ -130,6 +134,20 @@ impl Stages<'_> {
         let make = || levels::make(&job.mesh, &source, folder, workspace);
         let triangles = self.report.mesh.triangles;
         self.report.tiles = Some(self.clock.stage("tiles", "triangles", triangles, make)?);
+        Ok(())
+    }
+
+    /// The mesh with fewer triangles, if it is wanted.
+    pub fn simplify(&mut self) -> Result<()> {
+        let (job, workspace) = (self.job, self.workspace);
+        let Some(wanted) = job.params.triangles else {
+            return Ok(());
+        };
+        workspace.trim();
+        let make = || levels::simplify(&job.mesh, &job.output, wanted, workspace);
+        let triangles = self.report.mesh.triangles;
+        let made = self.clock.stage("simplify", "triangles", triangles, make)?;
+        self.report.simplified = Some(made);
         Ok(())
     }
 }

@@ -1,6 +1,6 @@
 //! How far each point moved from where it was measured: a column of the mesh.
 
-use super::{StoredColumns, Words};
+use super::StoredColumns;
 use crate::blocks::Blocks;
 use crate::order::PointStore;
 use outcrop_disk::error::Result;
@@ -48,12 +48,6 @@ pub fn displacement(
         Ok(())
     };
     workspace.units("displacement", blocks.count(), bytes, work, each)?;
-    let ids = (0..blocks.count()).map(|block| blocks.ids(block));
-    let words = Words {
-        words: 1,
-        table,
-        starts: ids.map(|ids| ids.start).collect(),
-    };
-    let columns = StoredColumns::new(vec![column.clone()], words);
+    let columns = StoredColumns::of(column.clone(), table, blocks);
     Ok((columns, (largest2 as f64).sqrt() * step))
 }

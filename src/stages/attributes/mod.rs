@@ -95,6 +95,18 @@ pub struct StoredColumns {
 }
 
 impl StoredColumns {
+    /// A column of one word, of the points of each block.
+    #[must_use]
+    pub fn of(column: Column, table: Table<Word>, blocks: Blocks) -> Self {
+        let ids = (0..blocks.count()).map(|block| blocks.ids(block));
+        let words = Words {
+            words: 1,
+            table,
+            starts: ids.map(|ids| ids.start).collect(),
+        };
+        Self::new(vec![column], words)
+    }
+
     fn new(columns: Vec<Column>, words: Words) -> Self {
         let parts = vec![Columns { columns, words }];
         Self { parts }

@@ -6,6 +6,7 @@
 pub mod cloud;
 pub mod dialect;
 pub mod folder;
+pub mod foreign;
 pub mod mesh;
 pub mod region;
 pub mod resume;

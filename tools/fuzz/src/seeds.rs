@@ -2,7 +2,7 @@
 
 mod scans;
 
-use crate::{folder, resume, scratch};
+use crate::{folder, foreign, resume, scratch};
 use outcrop_cloudgen::{Cloud, Encoding, Format, Kind, LasOptions, PointFormat, Precision};
 use std::error::Error;
 use std::io::Write;
@@ -51,6 +51,7 @@ pub fn write(folder: &Path) -> Result {
     }
     folders(&seeds)?;
     meshes(&seeds)?;
+    foreign_meshes(&seeds)?;
     scratch_files(&seeds)?;
     for stage in 0..6u8 {
         for (number, edits) in EDITS.iter().enumerate() {
@@ -313,6 +314,30 @@ fn meshes(seeds: &Seeds) -> Result {
             put(&0.5f32.to_le_bytes());
         }
         seeds.put("mesh", &format!("{name}.ply"), bytes)?;
+    }
+    Ok(())
+}
+
+/// Meshes in other formats, as the program writes them, and some lines of other programs.
+fn foreign_meshes(seeds: &Seeds) -> Result {
+    let lines = "mtllib a.mtl\nv 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0\nv 1 1 .5e0\nvt 0 0\nvn 0 0 1\nusemtl a\n\
+                 f 1/1/1 2//1 4 3/1\nf -1 -2 \\\n-3\nl 1 2\n";
+    seeds.put("foreign", "lines.obj", ["\0", lines].concat())?;
+    let facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1e0 0\nendloop\nendfacet\n";
+    let text = format!("\u{1}solid a\n{facet}{facet}endsolid a\n");
+    seeds.put("foreign", "text.stl", text)?;
+    let folder = tempfile::tempdir()?;
+    let cloud = folder.path().join("cloud.las");
+    let las = Format::Las(LasOptions::default());
+    Cloud::new(Kind::Sphere).points(300).write(&cloud, las)?;
+    for (number, ending) in (0u8..).zip(foreign::ENDINGS) {
+        let mesh = folder.path().join(format!("mesh.{ending}"));
+        let run = outcrop::Reconstruction::builder()
+            .input(&cloud)
+            .output(&mesh);
+        run.build()?.run()?;
+        let bytes = [vec![number], std::fs::read(&mesh)?].concat();
+        seeds.put("foreign", &format!("sphere.{ending}"), bytes)?;
     }
     Ok(())
 }

@@ -3,6 +3,7 @@
 use super::super::base::base;
 use super::super::interior::Interior;
 use super::*;
+use crate::stitch::StitchOptions;
 use crate::triples::triples;
 use outcrop_disk::workspace::Workspace;
 use outcrop_geom::Point;
@@ -53,8 +54,12 @@ fn across(starved: bool) -> (Left, [usize; 2]) {
     let seen = cells(&store, tiles, options, workspace).unwrap().0;
     let triples = triples(&seen, blocks, workspace).unwrap().0;
     let places = Places::new(&store, None, None, None);
-    let division = Some(crate::surface::evidence::Division::default());
-    let (base, _) = base(places, &triples, blocks, division, workspace).unwrap();
+    let options = StitchOptions {
+        cos_max_angle: 0.0,
+        weigh: Some(crate::surface::evidence::Division::default()),
+        keep_triples: false,
+    };
+    let (base, _) = base(places, &triples, blocks, options, workspace).unwrap();
     let interior = Interior::new(blocks.count());
     let unit = &workspace.unit();
     let insertion = Insertion {
