@@ -1,10 +1,12 @@
 //! The parameters of a reconstruction, with their ranges.
 
+mod close;
 mod facing;
 mod lengths;
 mod origin;
 mod smooth;
 
+pub use close::Close;
 pub use facing::Facing;
 pub use lengths::{MaxWidth, Radius};
 pub use origin::Origin;

@@ -5,8 +5,12 @@ mod beside;
 mod builder;
 mod checks;
 mod clock;
+#[cfg(feature = "levels")]
+mod close;
 mod disk;
 mod levels;
+#[cfg(feature = "levels")]
+mod like;
 mod manifest;
 #[cfg(feature = "levels")]
 mod mesh_job;
@@ -27,6 +31,8 @@ use attempt::Alarm;
 pub use builder::Builder;
 use checks::{not_an_input, one_system, writable};
 pub(crate) use clock::Clock;
+#[cfg(feature = "levels")]
+pub use close::Closing;
 pub(crate) use disk::Known;
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::memory::{MINIMUM_BUDGET, MemoryPool};

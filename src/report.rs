@@ -1,6 +1,9 @@
 //! The report of a run: the content of `--report`.
 
+mod close;
+
 use crate::params::Params;
+pub use close::CloseReport;
 pub use histogram::{Bin, Histogram};
 pub use outcrop_disk::workspace::course::Sample;
 use outcrop_draw::histogram;

@@ -1,18 +1,18 @@
 //! A run that makes a mesh with fewer triangles, and that can be resumed.
 
+use super::like::Like;
 use super::mesh_job::MeshJob;
 use super::resources::{Resources, resource_setters};
 use super::{Start, start::scratch_folder};
 use crate::report::SimplifyReport;
 use crate::write::{Bounds, write};
-use outcrop_codecs::ply_mesh::{PlyMesh, system};
+use outcrop_codecs::ply_mesh::PlyMesh;
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::progress::{Cancel, Observer};
 use outcrop_disk::workspace::{Storage, Workspace};
 use outcrop_inspect::compare;
 use outcrop_levels::single::{self, Goal, Options, Simplified};
-use outcrop_mesh_files::export::{self, CoordinateType, Mesh, VertexColumn};
-use outcrop_ply::Place;
+use outcrop_mesh_files::export;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -150,7 +150,13 @@ impl Simplification {
         let source = PlyMesh::open_any(&self.mesh, workspace)?;
         let mut bounds = Bounds::new(&self.output, made.vertices(), workspace);
         made.read(&mut bounds, workspace)?;
-        let (about, shift) = self.about(&source, made, bounds.corners(), workspace)?;
+        let like = Like {
+            mesh: &self.mesh,
+            source: &source,
+            output: &self.output,
+        };
+        let counts = [made.vertices(), made.triangles()];
+        let (about, shift) = like.about(counts, bounds.corners(), workspace)?;
         let all = about.bounds.unwrap_or_default();
         let largest = all.as_flattened().iter();
         let largest = largest.fold(0.0, |most: f64, x| most.max(x.abs()));
@@ -161,57 +167,5 @@ impl Simplification {
         write(&self.output, (about, shift), workspace, |writer| {
             made.read(writer, workspace)
         })
-    }
-
-    /// The properties of the file, and what its coordinates are less than those of the mesh.
-    fn about(
-        &self,
-        source: &PlyMesh,
-        made: &Simplified,
-        corners: Option<[[f64; 3]; 2]>,
-        workspace: &Workspace,
-    ) -> Result<(Mesh, [f64; 3])> {
-        let format = export::format_of(&self.output)?;
-        let [low, high] = corners.unwrap_or_default();
-        // Coordinates of a format without doubles are told from the corner of the mesh, if those of the file are doubles.
-        let is_moved = !source.has_floats() && !format.holds_doubles();
-        let shift = match is_moved {
-            true => low.map(f64::floor),
-            false => [0.0; 3],
-        };
-        if shift != [0.0; 3] {
-            let ([x, y, z], name) = (shift, format.name());
-            workspace.observer.warn(&format!(
-                "{name} holds 32-bit floats: its coordinates are those of the mesh less {x} {y} {z}"
-            ));
-        }
-        let mut comments = system(&self.mesh)?.comments();
-        if source.origin().is_some() || is_moved {
-            let origin = source.origin().unwrap_or_default();
-            let place = [0, 1, 2].map(|k| origin[k] + shift[k]);
-            comments.extend(Place::new(place, None).comments());
-        }
-        let columns = source.columns().into_iter();
-        let columns = columns.map(|(_, name, scalar)| VertexColumn {
-            name: name.to_owned(),
-            scalar,
-        });
-        let moved = |corner: [f64; 3]| [0, 1, 2].map(|k| corner[k] - shift[k]);
-        let span = (0..3).fold(1e-9, |most: f64, k| most.max(high[k] - low[k]));
-        let about = Mesh {
-            vertices: made.vertices(),
-            triangles: made.triangles(),
-            coordinates: match source.has_floats() {
-                true => CoordinateType::Float,
-                false => CoordinateType::Double,
-            },
-            columns: columns.collect(),
-            comments,
-            bounds: corners.map(|corners| corners.map(moved)),
-            // A hundred-millionth of the span, about.
-            decimals: (8.0 - span.log10().ceil()).clamp(0.0, 17.0) as usize,
-            ..Mesh::default()
-        };
-        Ok((about, shift))
     }
 }
