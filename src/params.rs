@@ -61,6 +61,8 @@ pub struct Params {
     pub crop_margin: Option<f64>,
     /// One mesh for each square of this side in x and y, in the input's unit, instead of one for all.
     pub split: Option<f64>,
+    /// Close the boundary of the mesh.
+    pub close: Option<Close>,
     /// Columns of the points that the mesh keeps, such as colours.
     pub attributes: Attributes,
     /// Colours with 16 bits instead of 8.
@@ -147,6 +149,7 @@ impl Default for Params {
             crop: None,
             crop_margin: None,
             split: None,
+            close: None,
             attributes: Attributes::None,
             wide_colors: false,
             thin: None,
@@ -318,6 +321,10 @@ impl Params {
             && !(side > 0.0 && side.is_finite())
         {
             return error("split", side.to_string(), "a positive length");
+        }
+        if self.close.is_some() && (self.split.is_some() || self.compress_glb) {
+            let found = "with split or compress_glb".to_owned();
+            return error("close", found, "a single mesh, not compressed");
         }
         if let Some(side) = self.thin
             && !(side > 0.0 && side.is_finite())

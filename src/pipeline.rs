@@ -7,6 +7,7 @@ mod checks;
 mod clock;
 #[cfg(feature = "levels")]
 mod close;
+mod closing;
 mod disk;
 mod levels;
 #[cfg(feature = "levels")]
@@ -58,6 +59,8 @@ pub struct Reconstruction {
     mesh: PathBuf,
     /// The output that was asked for.
     output: PathBuf,
+    /// The closed mesh, if that is wanted: then the mesh is one beside it, which is deleted at the end.
+    closed: Option<PathBuf>,
     /// The folder of the tileset, if that is wanted.
     tiles: Option<PathBuf>,
     folder: PathBuf,
@@ -136,6 +139,10 @@ impl Reconstruction {
     /// run can be resumed, see [`Reconstruction::is_unfinished`].
     pub fn run(&self) -> Result<Report> {
         writable(&self.mesh)?;
+        if let Some(closed) = &self.closed {
+            writable(closed)?;
+            not_an_input(closed, false, &self.inputs)?;
+        }
         self.tiles.as_deref().map_or(Ok(()), levels::check_folder)?;
         not_an_input(&self.mesh, self.params.split.is_some(), &self.inputs)?;
         one_system(&self.params, &self.inputs)?;
@@ -179,6 +186,7 @@ impl Reconstruction {
             &lattice,
         )?;
         stages.draw(&store, &shape, &repaired, pieces.as_ref(), blocks, &lattice)?;
+        stages.close()?;
         stages.levels()?;
         Ok(stages.report())
     }

@@ -226,6 +226,9 @@ pub struct Simplify {
     /// Leave the boundary as it is
     #[arg(long)]
     pub keep_boundary: bool,
+    /// Close the boundary of what is left, as `outcrop close` does [without a value: auto]
+    #[arg(long, value_name = "auto|lids|smooth|base[=Z]", num_args = 0..=1, default_missing_value = "auto")]
+    pub close: Option<Closed>,
     /// Samples of each mesh by which the distance between both is measured, e.g. 1e6; 0: it is not measured
     #[arg(long, value_name = "N", default_value = "1000000", value_parser = samples)]
     pub samples: u64,

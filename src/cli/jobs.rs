@@ -170,6 +170,7 @@ pub fn simplify(args: &Simplify, (observer, cancel): Watch) -> Result<SimplifyRe
     let mut job = Simplification::new(&args.mesh, &args.output, goal)
         .options(options)
         .samples(args.samples)
+        .close(args.close)
         .memory(memory(&args.limits))
         .threads(threads(&args.limits))
         .storage(args.limits.storing.storage())

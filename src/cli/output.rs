@@ -151,8 +151,15 @@ pub fn summary(report: &Report, output: &Path) -> String {
         style::seconds(report.seconds),
         style::bytes(report.peak_resident_bytes),
         style::bytes(report.peak_scratch_bytes),
-    ) + &smoothed(report)
+    ) + &closed(report)
+        + &smoothed(report)
         + &left_out(report)
+}
+
+/// Lines about the closing of the mesh, if it was closed.
+fn closed(report: &Report) -> String {
+    let closed = report.closed.as_ref();
+    closed.map_or_else(String::new, |closed| format!("\n{closed}"))
 }
 
 /// A line about the points that were smoothed because they are noisy, if there are any.

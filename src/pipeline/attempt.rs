@@ -98,6 +98,10 @@ impl Reconstruction {
                 levels::remove_unfinished(tiles);
                 beside::remove(&self.mesh);
             }
+            if let Some(closed) = &self.closed {
+                let _ = std::fs::remove_file(export::temporary(closed));
+                let _ = std::fs::remove_file(&self.mesh);
+            }
             if self.params.split.is_some() {
                 export::remove_unfinished(&self.mesh);
             }

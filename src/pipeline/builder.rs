@@ -3,7 +3,7 @@
 use super::manifest::Manifest;
 use super::resources::{Resources, resource_setters};
 use super::start::{Start, scratch_folder};
-use super::{Reconstruction, levels};
+use super::{Reconstruction, closing, levels};
 use crate::features::PAGES;
 use crate::params::Params;
 use outcrop_disk::error::{Error, Remedy, Result, Setting};
@@ -114,7 +114,10 @@ impl Builder {
             return missing("output", "the path of the mesh");
         }
         let tiles = levels::folder(&self.output, self.params.split.is_some())?;
+        let closed = self.params.close.map(|_| self.output.clone());
+        closing::check(closed.as_deref(), tiles.is_some())?;
         let mesh = tiles.as_deref().map(mesh_of);
+        let mesh = mesh.or_else(|| closed.as_deref().map(mesh_of));
         let named = mesh.as_deref().unwrap_or(&self.output);
         if self.folder.is_some() && check_name(named, true).is_err() {
             // An unfinished run whose mesh was a GLB, and is to be another now.
@@ -130,6 +133,7 @@ impl Builder {
             inputs: self.inputs,
             output: self.output.clone(),
             mesh: mesh.unwrap_or(self.output),
+            closed,
             tiles,
             memory: MemoryPool::new(resources.memory())?,
             threads: resources.threads(),
@@ -146,8 +150,8 @@ impl Builder {
     }
 }
 
-/// The mesh from which a tileset is made.
-fn mesh_of(folder: &Path) -> PathBuf {
+/// The mesh from which a tileset, or a closed mesh, is made.
+pub(super) fn mesh_of(folder: &Path) -> PathBuf {
     let mut name = std::ffi::OsString::from(".");
     name.push(folder.file_name().unwrap_or_default());
     name.push(".outcrop-mesh.ply");

@@ -98,6 +98,13 @@ impl Reconstruction {
                 expected: "a mesh; `outcrop tiles` makes levels of detail of it afterwards".into(),
             });
         }
+        if self.closed.is_some() {
+            return Err(Error::Parameter {
+                name: "close",
+                found: "a run that tasks share".into(),
+                expected: "`outcrop close` afterwards".into(),
+            });
+        }
         writable(&self.mesh)?;
         not_an_input(&self.mesh, self.params.split.is_some(), &self.inputs)?;
         one_system(&self.params, &self.inputs)?;

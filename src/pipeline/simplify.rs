@@ -1,9 +1,12 @@
 //! A run that makes a mesh with fewer triangles, and that can be resumed.
 
+use super::builder::mesh_of;
+use super::close::{check_output, closed};
 use super::like::Like;
 use super::mesh_job::MeshJob;
 use super::resources::{Resources, resource_setters};
 use super::{Start, start::scratch_folder};
+use crate::params::Close;
 use crate::report::SimplifyReport;
 use crate::write::{Bounds, write};
 use outcrop_codecs::ply_mesh::PlyMesh;
@@ -17,7 +20,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// The version of what a resumed run reads.
-const FORMAT: &str = "simplify 1";
+const FORMAT: &str = "simplify 2";
 
 /// The making of a mesh with fewer triangles.
 pub struct Simplification {
@@ -25,6 +28,7 @@ pub struct Simplification {
     output: PathBuf,
     options: Options,
     samples: u64,
+    close: Option<Close>,
     resources: Resources,
 }
 
@@ -36,6 +40,7 @@ impl Simplification {
             output: output.into(),
             options: Options::of(goal),
             samples: compare::Options::default().samples,
+            close: None,
             resources: Resources::default(),
         }
     }
@@ -53,6 +58,13 @@ impl Simplification {
     #[must_use]
     pub fn samples(mut self, samples: u64) -> Self {
         self.samples = samples;
+        self
+    }
+
+    /// Closes the boundary of what is left, if it says how.
+    #[must_use]
+    pub fn close(mut self, close: Option<Close>) -> Self {
+        self.close = close;
         self
     }
 
@@ -74,14 +86,19 @@ impl Simplification {
             format: FORMAT,
             mesh: &self.mesh,
             output: &self.output,
-            options: &self.options,
+            options: &(self.options.clone(), self.close),
             resources: &self.resources,
         };
-        job.run(|workspace| self.make(workspace), || ())
+        let clean = || {
+            if self.close.is_some() {
+                let _ = std::fs::remove_file(self.open());
+            }
+        };
+        job.run(|workspace| self.make(workspace), clean)
     }
 
     fn check(&self) -> Result<()> {
-        export::format_of(&self.output)?;
+        check_output(&self.mesh, &self.output)?;
         let refuse = |name, found: String, expected: &str| {
             Err(Error::Parameter {
                 name,
@@ -89,14 +106,6 @@ impl Simplification {
                 expected: expected.into(),
             })
         };
-        let output = self.output.display().to_string();
-        if export::is_compressed(&self.output) {
-            return refuse("output", output, "a name that does not end with .zst");
-        }
-        let whole = |path: &Path| path.canonicalize().ok();
-        if whole(&self.mesh).is_some_and(|mesh| whole(&self.output) == Some(mesh)) {
-            return refuse("output", output, "another file than the mesh");
-        }
         match self.options.goal {
             Goal::Triangles(0) => refuse("triangles", "0".into(), "1 or more"),
             Goal::Ratio(ratio) if !(ratio > 0.0 && ratio <= 1.0) => {
@@ -109,27 +118,34 @@ impl Simplification {
         }
     }
 
+    /// The mesh that is closed, or the output if none is.
+    fn open(&self) -> PathBuf {
+        match self.close {
+            Some(_) => mesh_of(&self.output),
+            None => self.output.clone(),
+        }
+    }
+
     fn make(&self, workspace: &Workspace) -> Result<SimplifyReport> {
         let made = single::simplify(&self.mesh, &self.options, workspace)?;
         let observer = &workspace.observer;
         observer.begin("write", "triangles", made.triangles());
-        workspace.once("write", |_| self.write(&made, workspace))?;
+        let open = self.open();
+        workspace.once("write", |_| self.write(&open, &made, workspace))?;
         observer.end();
+        let closed = self
+            .close
+            .map(|kind| closed(&open, &self.output, kind.into(), workspace));
+        let closed = closed.transpose()?;
         let measured = match self.samples {
             0 => None,
             samples
-                if self
-                    .output
+                if open
                     .extension()
                     .is_some_and(|e| e.eq_ignore_ascii_case("ply")) =>
             {
                 let options = compare::Options { samples, seed: 0 };
-                Some(compare::compare(
-                    &self.mesh,
-                    &self.output,
-                    &options,
-                    workspace,
-                )?)
+                Some(compare::compare(&self.mesh, &open, &options, workspace)?)
             }
             _ => None,
         };
@@ -143,17 +159,18 @@ impl Simplification {
             error: made.error,
             passes: made.passes,
             measured,
+            closed,
         })
     }
 
-    fn write(&self, made: &Simplified, workspace: &Workspace) -> Result<()> {
+    fn write(&self, output: &Path, made: &Simplified, workspace: &Workspace) -> Result<()> {
         let source = PlyMesh::open_any(&self.mesh, workspace)?;
-        let mut bounds = Bounds::new(&self.output, made.vertices(), workspace);
+        let mut bounds = Bounds::new(output, made.vertices(), workspace);
         made.read(&mut bounds, workspace)?;
         let like = Like {
             mesh: &self.mesh,
             source: &source,
-            output: &self.output,
+            output,
         };
         let counts = [made.vertices(), made.triangles()];
         let (about, shift) = like.about(counts, bounds.corners(), workspace)?;
@@ -161,10 +178,10 @@ impl Simplification {
         let largest = all.as_flattened().iter();
         let largest = largest.fold(0.0, |most: f64, x| most.max(x.abs()));
         let observer = &workspace.observer;
-        for warning in export::left_out(&self.output, &about, largest, &**observer)? {
+        for warning in export::left_out(output, &about, largest, &**observer)? {
             observer.warn(&warning);
         }
-        write(&self.output, (about, shift), workspace, |writer| {
+        write(output, (about, shift), workspace, |writer| {
             made.read(writer, workspace)
         })
     }

@@ -1,11 +1,11 @@
 //! What became of a mesh that was closed.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// What became of a mesh that was closed.
 #[cfg(feature = "levels")]
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CloseReport {
     /// Vertices of the mesh that was read.
     pub vertices_before: u64,
@@ -103,7 +103,7 @@ impl fmt::Display for CloseReport {
 
 /// The closed mesh of a build that makes none.
 #[cfg(not(feature = "levels"))]
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub enum CloseReport {}
 
 #[cfg(not(feature = "levels"))]

@@ -1,7 +1,7 @@
 //! The last stage: the mesh file, the origin of its coordinates, and what is beside it.
 
 use super::super::origin::Steps;
-use super::super::{beside, levels};
+use super::super::{beside, closing, levels};
 use super::Stages;
 use crate::params::Origin;
 use outcrop_disk::error::{Result, Setting};
@@ -113,8 +113,22 @@ impl Stages<'_> {
         self.report.mesh = self.clock.stage("export", "blocks", items, write)?;
         columns.map_or(Ok(()), |columns| columns.release(workspace))?;
         let wkt = self.wkt.as_deref();
-        let warnings = beside::write(&job.mesh, &job.inputs, &self.report, wkt)?;
+        let mesh = job.closed.as_ref().unwrap_or(&job.mesh);
+        let warnings = beside::write(mesh, &job.inputs, &self.report, wkt)?;
         warnings.into_iter().for_each(|warning| self.warn(warning));
+        Ok(())
+    }
+
+    /// The closed mesh, if it is wanted.
+    pub fn close(&mut self) -> Result<()> {
+        let (job, workspace) = (self.job, self.workspace);
+        let (Some(closed), Some(kind)) = (&job.closed, job.params.close) else {
+            return Ok(());
+        };
+        workspace.trim();
+        let make = || closing::make(&job.mesh, closed, kind, workspace);
+        let triangles = self.report.mesh.triangles;
+        self.report.closed = Some(self.clock.stage("close", "triangles", triangles, make)?);
         Ok(())
     }
 
