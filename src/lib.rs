@@ -49,7 +49,7 @@
 //!
 //! [`convert`] writes a finished mesh in another format.
 //!
-//! [`Simplification`] makes one mesh with fewer triangles of a mesh of any size, and [`Tiles`] levels of detail for
+//! [`Closing`] closes the boundary of a mesh of any size, [`Simplification`] makes one mesh with fewer triangles of it, and [`Tiles`] levels of detail for
 //! viewers of 3D Tiles.
 //!
 //! [`inspect`] describes a cloud, checks that a mesh is a manifold, and measures the distance between two
@@ -58,7 +58,7 @@
 //!
 //! [`call`] runs the commands of the program inside another one.
 //!
-//! `levels`, `page`, `view`, `Simplification`, `Tiles` and the pictures need the features `levels`, `pages` and `view`, which are on by
+//! `levels`, `page`, `view`, `Closing`, `Simplification`, `Tiles` and the pictures need the features `levels`, `pages` and `view`, which are on by
 //! default, like `e57` and `demo`.
 //!
 //! These items are the interface. The crates of which the program consists (`outcrop-geom`, `outcrop-disk`,
@@ -105,7 +105,7 @@ pub use params::{
 };
 pub use pipeline::{Builder, Reconstruction, Start, default_memory, default_threads};
 #[cfg(feature = "levels")]
-pub use pipeline::{Simplification, Tiles};
+pub use pipeline::{Closing, Simplification, Tiles};
 #[cfg(feature = "levels")]
-pub use report::SimplifyReport;
+pub use report::{CloseReport, SimplifyReport};
 pub use report::{DiskEstimate, Report};

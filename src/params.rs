@@ -1,10 +1,12 @@
 //! The parameters of a reconstruction, with their ranges.
 
+mod close;
 mod facing;
 mod lengths;
 mod origin;
 mod smooth;
 
+pub use close::Close;
 pub use facing::Facing;
 pub use lengths::{MaxWidth, Radius};
 pub use origin::Origin;
@@ -61,6 +63,8 @@ pub struct Params {
     pub split: Option<f64>,
     /// The mesh with this number of triangles, or with all it has if these are fewer.
     pub triangles: Option<u64>,
+    /// Close the boundary of the mesh.
+    pub close: Option<Close>,
     /// Columns of the points that the mesh keeps, such as colours.
     pub attributes: Attributes,
     /// Colours with 16 bits instead of 8.
@@ -148,6 +152,7 @@ impl Default for Params {
             crop_margin: None,
             split: None,
             triangles: None,
+            close: None,
             attributes: Attributes::None,
             wide_colors: false,
             thin: None,
@@ -328,6 +333,10 @@ impl Params {
                 () if self.compress_glb => return refuse("no compressed GLB at the same time"),
                 () => {}
             }
+        }
+        if self.close.is_some() && (self.split.is_some() || self.compress_glb) {
+            let found = "with split or compress_glb".to_owned();
+            return error("close", found, "a single mesh, not compressed");
         }
         if let Some(side) = self.thin
             && !(side > 0.0 && side.is_finite())

@@ -5,8 +5,13 @@ mod beside;
 mod builder;
 mod checks;
 mod clock;
+#[cfg(feature = "levels")]
+mod close;
 mod disk;
 mod levels;
+#[cfg(feature = "levels")]
+mod like;
+mod made;
 mod manifest;
 #[cfg(feature = "levels")]
 mod mesh_job;
@@ -27,6 +32,8 @@ use attempt::Alarm;
 pub use builder::Builder;
 use checks::{not_an_input, one_system, writable};
 pub(crate) use clock::Clock;
+#[cfg(feature = "levels")]
+pub use close::Closing;
 pub(crate) use disk::Known;
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
@@ -52,6 +59,9 @@ pub struct Reconstruction {
     mesh: PathBuf,
     /// The output that was asked for.
     output: PathBuf,
+    /// The mesh that is made of the whole one, if that is wanted: the whole one is then a file beside it, which is
+    /// deleted at the end.
+    made: Option<PathBuf>,
     /// The folder of the tileset, if that is wanted.
     tiles: Option<PathBuf>,
     folder: PathBuf,
@@ -130,6 +140,10 @@ impl Reconstruction {
     /// run can be resumed, see [`Reconstruction::is_unfinished`].
     pub fn run(&self) -> Result<Report> {
         writable(&self.mesh)?;
+        if let Some(made) = &self.made {
+            writable(made)?;
+            not_an_input(made, false, &self.inputs)?;
+        }
         self.tiles.as_deref().map_or(Ok(()), levels::check_folder)?;
         not_an_input(&self.mesh, self.params.split.is_some(), &self.inputs)?;
         one_system(&self.params, &self.inputs)?;
@@ -175,7 +189,7 @@ impl Reconstruction {
             &lattice,
         )?;
         stages.draw(&store, &shape, &repaired, pieces.as_ref(), blocks, &lattice)?;
-        stages.simplify()?;
+        stages.make_of_whole()?;
         stages.levels()?;
         Ok(stages.report())
     }

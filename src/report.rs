@@ -1,6 +1,9 @@
 //! The report of a run: the content of `--report`.
 
+mod close;
+
 use crate::params::Params;
+pub use close::CloseReport;
 pub use histogram::{Bin, Histogram};
 pub use outcrop_disk::workspace::course::Sample;
 use outcrop_draw::histogram;
@@ -65,6 +68,8 @@ pub struct SimplifyReport {
     pub passes: u32,
     /// Distances between both meshes, as `compare` measures them: the first is the mesh that was read.
     pub measured: Option<outcrop_inspect::compare::Comparison>,
+    /// The closing of what was left, if it was closed; the counts above are without it.
+    pub closed: Option<CloseReport>,
 }
 
 #[cfg(feature = "levels")]
@@ -106,6 +111,9 @@ impl std::fmt::Display for SimplifyReport {
                 "\ndistance between both meshes: mean {:.6}, 99.9 % at most {:.6}, largest {:.6}",
                 figures.mean, figures.p99_9, figures.max
             )?;
+        }
+        if let Some(closed) = &self.closed {
+            write!(f, "\n{closed}")?;
         }
         Ok(())
     }
@@ -174,6 +182,8 @@ pub struct Report {
     pub cut: CutStats,
     /// The mesh.
     pub mesh: MeshStats,
+    /// The closing of the mesh, if it was closed; then `mesh` counts what it had before.
+    pub closed: Option<CloseReport>,
     /// Levels of detail, if they were made.
     pub tiles: Option<TilesReport>,
     /// The mesh with fewer triangles, if it was asked for; `mesh` is then the one of which it was made.

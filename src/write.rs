@@ -139,6 +139,12 @@ pub(crate) struct Writer<'a> {
 }
 
 impl Writer<'_> {
+    /// Notes whether the triangles that come next close the mesh, if the file tells it.
+    #[cfg(feature = "levels")]
+    pub fn fill(&mut self, filled: bool) {
+        self.about.filled = self.about.filled.map(|_| filled);
+    }
+
     fn put(&mut self) -> Result<()> {
         let done = self.file.write_all(&self.bytes);
         self.bytes.clear();

@@ -138,6 +138,7 @@ fn of_commands() -> BTreeMap<&'static str, BTreeSet<String>> {
         "verify",
         "compare",
         "simplify",
+        "close",
         "tiles",
         "view",
         "demo",

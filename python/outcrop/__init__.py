@@ -47,6 +47,7 @@ __all__ = [
     "OutcropWarning",
     "ParameterError",
     "ScratchError",
+    "close",
     "compare",
     "info",
     "reconstruct",
@@ -75,6 +76,7 @@ def reconstruct(
     compress_glb: bool = False,
     split: Optional[float] = None,
     triangles: Optional[int] = None,
+    close: Union[str, bool, None] = None,
     drop_classes: Optional[Classes] = None,
     keep_classes: Optional[Classes] = None,
     skip_lines: int = 0,
@@ -258,6 +260,7 @@ def simplify(
     ratio: Optional[float] = None,
     error: Optional[float] = None,
     keep_boundary: bool = False,
+    close: Union[str, bool, None] = None,
     samples: Union[int, float, str] = 1_000_000,
     memory: Optional[Size] = None,
     threads: Optional[int] = None,
@@ -275,6 +278,30 @@ def simplify(
     options = dict(locals())
     del options["mesh"], options["progress"]
     return run(["simplify", *words(options), "--", _path(mesh)], progress, quiet)[0]
+
+
+def close(
+    mesh: Union[Mesh, Path],
+    *,
+    output: Path,
+    progress: Union[Progress, bool, None] = None,
+    kind: str = "auto",
+    memory: Optional[Size] = None,
+    threads: Optional[int] = None,
+    scratch: Optional[Path] = None,
+    io: str = "auto",
+    scratch_compression: Union[int, str] = "auto",
+    quiet: bool = False,
+    resume: bool = False,
+    restart: bool = False,
+) -> Answer:
+    """Closes the boundary of a mesh (PLY), in the file ``output``.
+
+    ``kind`` is ``auto``, ``lids``, ``smooth``, ``base`` or ``base=Z``. ``Mesh(output)`` opens what was made.
+    """
+    options = dict(locals())
+    del options["mesh"], options["progress"]
+    return run(["close", *words(options), "--", _path(mesh)], progress, quiet)[0]
 
 
 def _path(mesh: Union[Mesh, Path]) -> str:

@@ -67,6 +67,12 @@ class Mesh:
         return corners.view("<u4")
 
     @property
+    def filled(self) -> Optional[npt.NDArray[np.bool_]]:
+        """True for triangles that close the mesh, m; none if the mesh was not closed."""
+        faces = self._map()[1]
+        return faces["filled"] != 0 if "filled" in (faces.dtype.names or ()) else None
+
+    @property
     def columns(self) -> dict[str, Array]:
         """The values of the vertices by name: those that the points carried, and normals ``nx``, ``ny``, ``nz``."""
         vertices = self._map()[0]
@@ -206,10 +212,10 @@ def _mapped(path: str) -> tuple[Array, Array, list[str]]:
     if [name for name, _ in fields[:3]] != ["x", "y", "z"] or len({kind for _, kind in fields[:3]}) != 1:
         raise _unfit(path, "vertices that begin with x, y and z of one type")
     vertex = np.dtype([("xyz", fields[0][1], (3,)), *fields[3:]])
-    [(_, index)] = properties.get("face") or [("", "")]
+    (_, index), *more = properties.get("face") or [("", "")]
     if index not in ("<i4", "<u4"):
         raise _unfit(path, "faces that are lists of three int")
-    face = np.dtype([("count", "u1"), ("corners", index, (3,))])
+    face = np.dtype([("count", "u1"), ("corners", index, (3,)), *more])
     middle = start + counts["vertex"] * vertex.itemsize
     if os.path.getsize(path) != middle + counts["face"] * face.itemsize:
         raise _unfit(path, "a file that has just its vertices and triangles")

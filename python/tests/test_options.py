@@ -11,7 +11,7 @@ import pytest
 import outcrop
 from outcrop import _outcrop, _run
 
-COMMANDS = ["reconstruct", "info", "verify", "compare", "simplify", "tiles"]
+COMMANDS = ["reconstruct", "info", "verify", "compare", "simplify", "close", "tiles"]
 
 # Keywords that are no options: arrays, and the display of the progress.
 OURS = {"colors", "progress"}

@@ -220,6 +220,27 @@ def test_a_mesh_with_fewer_triangles(points: Points, tmp_path: Path, program: An
     assert not (tmp_path / "none.ply").exists()
 
 
+def test_a_closed_mesh(points: Points, tmp_path: Path, program: Any) -> None:
+    mesh = outcrop.reconstruct(points, output=tmp_path / "mesh.ply", memory=MEMORY)
+    made = outcrop.close(mesh, output=tmp_path / "closed.ply", kind="base", memory=MEMORY)
+    verdict = outcrop.verify(tmp_path / "closed.ply", memory=MEMORY)
+    assert verdict["manifold"] is True and verdict["closed"] is True and verdict["volume"] > 0
+    filled = outcrop.Mesh(tmp_path / "closed.ply").filled
+    assert filled is not None and filled.sum() == made["triangles"] - made["triangles_before"]
+    assert mesh.filled is None
+    assert made["kind"] == {"base": None} and made["closed"]["base"]["loops"] == 1
+    said = program("close", mesh.path, "-o", tmp_path / "again.ply", "--kind", "base", "--memory", MEMORY).stdout
+    assert said.rstrip("\n") == str(made)
+    assert (tmp_path / "again.ply").read_bytes() == (tmp_path / "closed.ply").read_bytes()
+    again = outcrop.reconstruct(points, output=tmp_path / "whole.ply", close="base", memory=MEMORY)
+    assert outcrop.verify(again, memory=MEMORY)["closed"] is True
+    small = outcrop.simplify(mesh, output=tmp_path / "small.ply", ratio=0.2, close=True, samples=0, memory=MEMORY)
+    assert outcrop.verify(tmp_path / "small.ply", memory=MEMORY)["closed"] is True
+    assert small["closed"]["closed"]["lids"]["loops"] >= 1
+    with pytest.raises(outcrop.ParameterError, match="close"):
+        outcrop.close(mesh, output=tmp_path / "none.ply", kind="base=1e9", memory=MEMORY)
+
+
 def test_progress_is_told(points: Points) -> None:
     told: list[tuple[str, int, int]] = []
 

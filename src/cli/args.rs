@@ -3,6 +3,7 @@
 mod job;
 
 use super::parse::{count, samples, size, system, time};
+use crate::params::Close as Closed;
 use crate::pipeline::Start;
 use clap::{ArgAction, Args as ClapArgs};
 pub use job::{Job, Points};
@@ -225,12 +226,37 @@ pub struct Simplify {
     /// Leave the boundary as it is
     #[arg(long)]
     pub keep_boundary: bool,
+    /// Close the boundary of what is left, as `outcrop close` does [without a value: auto]
+    #[arg(long, value_name = "auto|lids|smooth|base[=Z]", num_args = 0..=1, default_missing_value = "auto")]
+    pub close: Option<Closed>,
     /// Samples of each mesh by which the distance between both is measured, e.g. 1e6; 0: it is not measured
     #[arg(long, value_name = "N", default_value = "1000000", value_parser = samples)]
     pub samples: u64,
     /// Most triangles of a cell
     #[arg(long, hide = true, default_value = "131072", value_parser = clap::value_parser!(u32).range(1..))]
     pub most_triangles: u32,
+    /// Print JSON
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub limits: Limits,
+    #[command(flatten)]
+    pub again: Again,
+}
+
+/// `outcrop close`
+#[derive(Debug, ClapArgs)]
+pub struct Close {
+    /// The mesh (PLY, also as .zst)
+    #[arg(value_name = "MESH")]
+    pub mesh: PathBuf,
+    /// The mesh to write: .ply, .obj, .stl or .glb
+    #[arg(long, short, value_name = "OUT")]
+    pub output: PathBuf,
+    /// How: auto (smooth where the surface runs on into the hole, else a lid), lids, smooth, or base (walls from outer
+    /// rims down to a floor)
+    #[arg(long, value_name = "auto|lids|smooth|base[=Z]", default_value = "auto")]
+    pub kind: Closed,
     /// Print JSON
     #[arg(long)]
     pub json: bool,

@@ -25,7 +25,7 @@
 use super::command::{Args, Command};
 use super::{jobs, output};
 use crate::info::Info;
-use crate::report::{Report, SimplifyReport, TilesReport};
+use crate::report::{CloseReport, Report, SimplifyReport, TilesReport};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{ArgAction, CommandFactory, Parser};
 use outcrop_disk::error::{Error, Result, Setting};
@@ -55,8 +55,10 @@ pub enum Answer {
     Comparison(Box<Comparison>),
     /// Of `tiles`.
     Tiles(Box<TilesReport>),
-    /// `simplify`.
+    /// Of `simplify`.
     Simplify(Box<SimplifyReport>),
+    /// Of `close`.
+    Close(Box<CloseReport>),
 }
 
 impl Answer {
@@ -72,6 +74,7 @@ impl Answer {
             Self::Comparison(comparison) => output::json(comparison),
             Self::Tiles(report) => output::json(report),
             Self::Simplify(report) => output::json(report),
+            Self::Close(report) => output::json(report),
         }
     }
 
@@ -91,6 +94,7 @@ impl Answer {
             Self::Comparison(comparison) => comparison.to_string(),
             Self::Tiles(report) => report.told(spell),
             Self::Simplify(report) => report.to_string(),
+            Self::Close(report) => report.to_string(),
         }
     }
 }
@@ -136,8 +140,8 @@ impl CallError {
     }
 }
 
-/// Runs `reconstruct`, `resume`, `info`, `verify`, `compare`, `simplify` or `tiles`; `words` are those behind the name of the
-/// program.
+/// Runs `reconstruct`, `resume`, `info`, `verify`, `compare`, `simplify`, `close` or `tiles`; `words` are those behind the
+/// name of the program.
 ///
 /// # Errors
 /// [`CallError`]. After one that [can be resumed](Error::can_resume) the scratch folder stays.
@@ -161,6 +165,7 @@ pub fn run<W: Into<OsString>>(
         Command::Verify(args) => Answer::Verdict(Box::new(jobs::verify(&args, watch)?)),
         Command::Compare(args) => Answer::Comparison(Box::new(jobs::compare(&args, watch)?)),
         Command::Simplify(args) => Answer::Simplify(Box::new(jobs::simplify(&args, watch)?)),
+        Command::Close(args) => Answer::Close(Box::new(jobs::close(&args, watch)?)),
         Command::Tiles(args) => Answer::Tiles(Box::new(jobs::tiles(&args, watch)?)),
         _ => {
             let why = "this command is for the command line only";

@@ -1,6 +1,6 @@
 //! The commands and their help.
 
-use super::args::{Compare, Demo, Info, Reconstruct, Resume, Simplify, Tiles, Verify, View};
+use super::args::{Close, Compare, Demo, Info, Reconstruct, Resume, Simplify, Tiles, Verify, View};
 use super::shared::{Advance, Plan, Status, Submit, Work};
 use crate::features;
 use clap::{Parser, Subcommand};
@@ -44,6 +44,7 @@ pub const EXAMPLES: &str = "  outcrop reconstruct scan.laz -o mesh.ply
   outcrop verify mesh.ply && echo manifold
   outcrop compare mesh.ply scan.laz --html distances.html
   outcrop simplify mesh.ply -o small.ply --triangles 2e6
+  outcrop close mesh.ply -o print.stl
   outcrop tiles mesh.ply -o town
   outcrop view mesh.ply
   outcrop demo
@@ -72,6 +73,8 @@ pub enum Command {
     Verify(Verify),
     /// Make a mesh with fewer triangles
     Simplify(Simplify),
+    /// Close the boundary of a mesh: smoothly, by lids, or by a base
+    Close(Close),
     /// Cut a mesh into levels of detail for 3D Tiles viewers
     Tiles(Tiles),
     /// Measure the distance between two meshes or clouds

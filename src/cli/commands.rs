@@ -1,6 +1,6 @@
 //! The commands of the program: their work, and what they print.
 
-use super::args::{Compare, Info, Quiet, Reconstruct, Resume, Simplify, Tiles, Verify};
+use super::args::{Close, Compare, Info, Quiet, Reconstruct, Resume, Simplify, Tiles, Verify};
 use super::command::Command;
 #[cfg(feature = "demo")]
 use super::demo;
@@ -24,6 +24,7 @@ pub fn run(command: Command) -> Result<Ended> {
         Command::Verify(args) => check(&args),
         Command::Compare(args) => measure(&args),
         Command::Simplify(args) => simplify(&args),
+        Command::Close(args) => close(&args),
         Command::Tiles(args) => tiles(&args),
         Command::View(args) => view::run(&args),
         Command::Demo(args) => demo::run(&args),
@@ -83,6 +84,12 @@ fn measure(args: &Compare) -> Result<bool> {
 
 fn simplify(args: &Simplify) -> Result<bool> {
     let report = jobs::simplify(args, stop::watched(args.limits.quiet))?;
+    show(&report, args.json)?;
+    Ok(true)
+}
+
+fn close(args: &Close) -> Result<bool> {
+    let report = jobs::close(args, stop::watched(args.limits.quiet))?;
     show(&report, args.json)?;
     Ok(true)
 }

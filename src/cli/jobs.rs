@@ -1,7 +1,7 @@
 //! The work of the commands: from arguments to results, without a word on the screen.
 
 use super::args::{
-    Compare, Ends, Info, Limits, Reconstruct, Resume, Simplify, Tiles as TilesArgs, Verify,
+    Close, Compare, Ends, Info, Limits, Reconstruct, Resume, Simplify, Tiles as TilesArgs, Verify,
 };
 use super::output::{NewFile, is_page, report_text};
 use super::pages;
@@ -11,8 +11,8 @@ use crate::info;
 use crate::params::Params;
 use crate::pipeline::{Builder, Reconstruction, default_memory, default_threads};
 #[cfg(feature = "levels")]
-use crate::pipeline::{Simplification, Tiles};
-use crate::report::{Report, SimplifyReport, TilesReport};
+use crate::pipeline::{Closing, Simplification, Tiles};
+use crate::report::{CloseReport, Report, SimplifyReport, TilesReport};
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::memory::MemoryPool;
@@ -170,6 +170,7 @@ pub fn simplify(args: &Simplify, (observer, cancel): Watch) -> Result<SimplifyRe
     let mut job = Simplification::new(&args.mesh, &args.output, goal)
         .options(options)
         .samples(args.samples)
+        .close(args.close)
         .memory(memory(&args.limits))
         .threads(threads(&args.limits))
         .storage(args.limits.storing.storage())
@@ -185,6 +186,29 @@ pub fn simplify(args: &Simplify, (observer, cancel): Watch) -> Result<SimplifyRe
 /// The answer of a build without levels of detail.
 #[cfg(not(feature = "levels"))]
 pub fn simplify(_: &Simplify, _: Watch) -> Result<SimplifyReport> {
+    Err(LEVELS.missing())
+}
+
+/// Closes a mesh.
+#[cfg(feature = "levels")]
+pub fn close(args: &Close, (observer, cancel): Watch) -> Result<CloseReport> {
+    let mut job = Closing::new(&args.mesh, &args.output)
+        .kind(args.kind)
+        .memory(memory(&args.limits))
+        .threads(threads(&args.limits))
+        .storage(args.limits.storing.storage())
+        .start(args.again.start())
+        .observer(observer)
+        .cancel(cancel);
+    if let Some(scratch) = &args.limits.scratch {
+        job = job.scratch(scratch);
+    }
+    job.run()
+}
+
+/// The answer of a build without levels of detail.
+#[cfg(not(feature = "levels"))]
+pub fn close(_: &Close, _: Watch) -> Result<CloseReport> {
     Err(LEVELS.missing())
 }
 

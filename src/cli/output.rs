@@ -152,6 +152,7 @@ pub fn summary(report: &Report, output: &Path) -> String {
         style::bytes(report.peak_resident_bytes),
         style::bytes(report.peak_scratch_bytes),
     ) + &simplified(report)
+        + &closed(report)
         + &smoothed(report)
         + &left_out(report)
 }
@@ -160,6 +161,12 @@ pub fn summary(report: &Report, output: &Path) -> String {
 fn simplified(report: &Report) -> String {
     let made = report.simplified.as_ref();
     made.map_or_else(String::new, |made| format!("\nsimplified: {made}"))
+}
+
+/// Lines about the closing of the mesh, if it was closed.
+fn closed(report: &Report) -> String {
+    let closed = report.closed.as_ref();
+    closed.map_or_else(String::new, |closed| format!("\n{closed}"))
 }
 
 /// A line about the points that were smoothed because they are noisy, if there are any.

@@ -4,9 +4,10 @@
 //! Every other tile is made from its children: they are joined, simplified (`simplify`) and measured against the
 //! joined surface (`distance`). A vertex that has triangles outside of the tile is not removed, so that tiles of
 //! any two levels meet without a crack. `docs/tiles.md` describes the files. `single` makes one mesh with fewer
-//! triangles instead, from the same cells.
+//! triangles instead, from the same cells, and `close` a mesh without a boundary.
 
 mod cells;
+pub mod close;
 mod columns;
 mod distance;
 mod folder;

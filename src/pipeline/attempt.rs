@@ -1,5 +1,6 @@
 //! One attempt at a run: its beginning, its time limit, and the removal of its scratch files.
 
+use super::builder::open_of;
 use super::manifest::Manifest;
 use super::{Reconstruction, Start, beside, levels};
 use crossbeam_channel::{RecvTimeoutError, Sender, bounded};
@@ -98,7 +99,9 @@ impl Reconstruction {
                 levels::remove_unfinished(tiles);
                 beside::remove(&self.mesh);
             }
-            if self.params.triangles.is_some() {
+            if let Some(made) = &self.made {
+                let _ = std::fs::remove_file(export::temporary(made));
+                let _ = std::fs::remove_file(open_of(made));
                 let _ = std::fs::remove_file(&self.mesh);
             }
             if self.params.split.is_some() {

@@ -3,7 +3,7 @@
 use super::manifest::Manifest;
 use super::resources::{Resources, resource_setters};
 use super::start::{Start, scratch_folder};
-use super::{Reconstruction, levels};
+use super::{Reconstruction, levels, made};
 use crate::features::PAGES;
 use crate::params::Params;
 use outcrop_disk::error::{Error, Remedy, Result, Setting};
@@ -114,9 +114,9 @@ impl Builder {
             return missing("output", "the path of the mesh");
         }
         let tiles = levels::folder(&self.output, self.params.split.is_some())?;
-        let simplified = levels::simplified(&self.output, &self.params, tiles.is_some())?;
+        let made = made::output(&self.output, &self.params, tiles.is_some())?;
         let target = tiles.as_deref().unwrap_or(&self.output);
-        let mesh = (tiles.is_some() || simplified).then(|| mesh_of(target));
+        let mesh = (tiles.is_some() || made.is_some()).then(|| mesh_of(target));
         let named = mesh.as_deref().unwrap_or(&self.output);
         if self.folder.is_some() && check_name(named, true).is_err() {
             // An unfinished run whose mesh was a GLB, and is to be another now.
@@ -131,6 +131,7 @@ impl Builder {
             inputs: self.inputs,
             output: self.output.clone(),
             mesh: mesh.unwrap_or(self.output),
+            made,
             tiles,
             memory: MemoryPool::new(resources.memory())?,
             threads: resources.threads(),
@@ -147,11 +148,21 @@ impl Builder {
     }
 }
 
-/// The mesh from which a tileset, or one with fewer triangles, is made.
+/// The mesh from which a tileset, a smaller mesh or a closed one is made.
 fn mesh_of(target: &Path) -> PathBuf {
+    hidden(target, "mesh")
+}
+
+/// The smaller mesh that is not closed yet.
+pub(super) fn open_of(target: &Path) -> PathBuf {
+    hidden(target, "open")
+}
+
+/// A hidden mesh beside a file or folder.
+fn hidden(target: &Path, what: &str) -> PathBuf {
     let mut name = std::ffi::OsString::from(".");
     name.push(target.file_name().unwrap_or_default());
-    name.push(".outcrop-mesh.ply");
+    name.push(format!(".outcrop-{what}.ply"));
     target.with_file_name(name)
 }
 

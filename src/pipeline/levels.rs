@@ -2,16 +2,14 @@
 //! asked of it.
 
 #[cfg(not(feature = "levels"))]
-pub use absent::{check_folder, make, outlook, remove_unfinished, simplify};
+pub use absent::{check_folder, make, outlook, remove_unfinished};
 #[cfg(feature = "levels")]
-pub use made::{make, simplify};
+pub use made::make;
 #[cfg(feature = "levels")]
 pub use outcrop_levels::{check_folder, outlook::of_points as outlook, remove_unfinished};
 
 use crate::features::LEVELS;
-use crate::params::Params;
 use outcrop_disk::error::{Error, Result};
-use outcrop_mesh_files::export::{format_of, is_compressed};
 use std::path::{Path, PathBuf};
 
 /// The name of the file that is asked for.
@@ -43,31 +41,10 @@ pub fn folder(output: &Path, split: bool) -> Result<Option<PathBuf>> {
     }
 }
 
-/// True if the mesh is to be simplified to a number of triangles. An output that is a tileset, or compressed, is
-/// refused.
-pub fn simplified(output: &Path, params: &Params, tiles: bool) -> Result<bool> {
-    let Some(triangles) = params.triangles else {
-        return Ok(false);
-    };
-    LEVELS.require()?;
-    if tiles || is_compressed(output) {
-        return Err(Error::Parameter {
-            name: "triangles",
-            found: format!("{triangles} of {}", output.display()),
-            expected: "a mesh as output, not compressed with .zst and no tileset".into(),
-        });
-    }
-    format_of(output)?;
-    Ok(true)
-}
-
 #[cfg(feature = "levels")]
 mod made {
-    use crate::pipeline::Simplification;
-    use crate::report::SimplifyReport;
     use outcrop_disk::error::Result;
     use outcrop_disk::workspace::Workspace;
-    use outcrop_levels::single::Goal;
     use outcrop_levels::{Options, TilesReport, tileset};
     use std::path::Path;
 
@@ -80,22 +57,12 @@ mod made {
     ) -> Result<TilesReport> {
         tileset(mesh, source, folder, &Options::default(), workspace)
     }
-
-    /// Makes `output` of a mesh, with this number of triangles.
-    pub fn simplify(
-        mesh: &Path,
-        output: &Path,
-        triangles: u64,
-        workspace: &Workspace,
-    ) -> Result<SimplifyReport> {
-        Simplification::new(mesh, output, Goal::Triangles(triangles)).make(workspace)
-    }
 }
 
 #[cfg(not(feature = "levels"))]
 mod absent {
     use crate::features::LEVELS;
-    use crate::report::{SimplifyReport, TilesReport};
+    use crate::report::TilesReport;
     use outcrop_disk::error::Result;
     use outcrop_disk::workspace::Workspace;
     use outcrop_disk::workspace::outlook::Planned;
@@ -106,10 +73,6 @@ mod absent {
     }
 
     pub fn make(_: &Path, _: &str, _: &Path, _: &Workspace) -> Result<TilesReport> {
-        Err(LEVELS.missing())
-    }
-
-    pub fn simplify(_: &Path, _: &Path, _: u64, _: &Workspace) -> Result<SimplifyReport> {
         Err(LEVELS.missing())
     }
 

@@ -3,7 +3,7 @@
 
 use super::checks::{all_are_kept, not_an_input, one_system, writable};
 use super::manifest::Manifest;
-use super::{Builder, Known, Reconstruction};
+use super::{Builder, Known, Reconstruction, made};
 use crate::report::Report;
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::generations::{Generation, Opened, Resources, SharedFolder};
@@ -98,12 +98,11 @@ impl Reconstruction {
                 expected: "a mesh; `outcrop tiles` makes levels of detail of it afterwards".into(),
             });
         }
-        if let Some(triangles) = self.params.triangles {
+        if let Some(name) = made::asked(&self.params) {
             return Err(Error::Parameter {
-                name: "triangles",
-                found: triangles.to_string(),
-                expected: "a whole mesh; `outcrop simplify` makes a smaller one of it afterwards"
-                    .into(),
+                name,
+                found: "a run that tasks share".into(),
+                expected: "`outcrop simplify` or `outcrop close` afterwards".into(),
             });
         }
         writable(&self.mesh)?;

@@ -1,23 +1,26 @@
 //! A run that makes a mesh with fewer triangles, and that can be resumed.
 
+use super::builder::open_of;
+use super::close::{check_output, closed};
+use super::like::Like;
 use super::mesh_job::MeshJob;
 use super::resources::{Resources, resource_setters};
 use super::{Start, start::scratch_folder};
+use crate::params::Close;
 use crate::report::SimplifyReport;
 use crate::write::{Bounds, write};
-use outcrop_codecs::ply_mesh::{PlyMesh, system};
+use outcrop_codecs::ply_mesh::PlyMesh;
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::progress::{Cancel, Observer};
 use outcrop_disk::workspace::{Storage, Workspace};
 use outcrop_inspect::compare;
 use outcrop_levels::single::{self, Goal, Options, Simplified};
-use outcrop_mesh_files::export::{self, CoordinateType, Mesh, VertexColumn};
-use outcrop_ply::Place;
+use outcrop_mesh_files::export;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// The version of what a resumed run reads.
-const FORMAT: &str = "simplify 1";
+const FORMAT: &str = "simplify 2";
 
 /// The making of a mesh with fewer triangles.
 pub struct Simplification {
@@ -25,6 +28,7 @@ pub struct Simplification {
     output: PathBuf,
     options: Options,
     samples: u64,
+    close: Option<Close>,
     resources: Resources,
 }
 
@@ -36,6 +40,7 @@ impl Simplification {
             output: output.into(),
             options: Options::of(goal),
             samples: compare::Options::default().samples,
+            close: None,
             resources: Resources::default(),
         }
     }
@@ -53,6 +58,13 @@ impl Simplification {
     #[must_use]
     pub fn samples(mut self, samples: u64) -> Self {
         self.samples = samples;
+        self
+    }
+
+    /// Closes the boundary of what is left, if it says how.
+    #[must_use]
+    pub fn close(mut self, close: Option<Close>) -> Self {
+        self.close = close;
         self
     }
 
@@ -74,14 +86,19 @@ impl Simplification {
             format: FORMAT,
             mesh: &self.mesh,
             output: &self.output,
-            options: &self.options,
+            options: &(self.options.clone(), self.close),
             resources: &self.resources,
         };
-        job.run(|workspace| self.make(workspace), || ())
+        let clean = || {
+            if self.close.is_some() {
+                let _ = std::fs::remove_file(self.open());
+            }
+        };
+        job.run(|workspace| self.make(workspace), clean)
     }
 
     fn check(&self) -> Result<()> {
-        export::format_of(&self.output)?;
+        check_output(&self.mesh, &self.output)?;
         let refuse = |name, found: String, expected: &str| {
             Err(Error::Parameter {
                 name,
@@ -89,14 +106,6 @@ impl Simplification {
                 expected: expected.into(),
             })
         };
-        let output = self.output.display().to_string();
-        if export::is_compressed(&self.output) {
-            return refuse("output", output, "a name that does not end with .zst");
-        }
-        let whole = |path: &Path| path.canonicalize().ok();
-        if whole(&self.mesh).is_some_and(|mesh| whole(&self.output) == Some(mesh)) {
-            return refuse("output", output, "another file than the mesh");
-        }
         match self.options.goal {
             Goal::Triangles(0) => refuse("triangles", "0".into(), "1 or more"),
             Goal::Ratio(ratio) if !(ratio > 0.0 && ratio <= 1.0) => {
@@ -109,29 +118,37 @@ impl Simplification {
         }
     }
 
+    /// The mesh that is closed, or the output if none is.
+    fn open(&self) -> PathBuf {
+        match self.close {
+            Some(_) => open_of(&self.output),
+            None => self.output.clone(),
+        }
+    }
+
     /// Makes the mesh in a workspace.
     pub(super) fn make(&self, workspace: &Workspace) -> Result<SimplifyReport> {
         let made = single::simplify(&self.mesh, &self.options, workspace)?;
         let observer = &workspace.observer;
         observer.begin("write", "triangles", made.triangles());
-        workspace.once("write", |_| self.write(&made, workspace))?;
+        let open = self.open();
+        workspace.once("write", |_| self.write(&open, &made, workspace))?;
         observer.end();
+        let closed = self
+            .close
+            .map(|kind| closed(&open, &self.output, kind.into(), workspace));
+        let closed = closed.transpose()?;
         let measured = match self.samples {
             0 => None,
             samples
-                if self.output.extension().is_some_and(|e| {
+                if open.extension().is_some_and(|e| {
                     ["ply", "obj"]
                         .iter()
                         .any(|read| e.eq_ignore_ascii_case(read))
                 }) =>
             {
                 let options = compare::Options { samples, seed: 0 };
-                Some(compare::compare(
-                    &self.mesh,
-                    &self.output,
-                    &options,
-                    workspace,
-                )?)
+                Some(compare::compare(&self.mesh, &open, &options, workspace)?)
             }
             _ => None,
         };
@@ -145,75 +162,30 @@ impl Simplification {
             error: made.error,
             passes: made.passes,
             measured,
+            closed,
         })
     }
 
-    fn write(&self, made: &Simplified, workspace: &Workspace) -> Result<()> {
+    fn write(&self, output: &Path, made: &Simplified, workspace: &Workspace) -> Result<()> {
         let source = PlyMesh::open_any(&self.mesh, workspace)?;
-        let mut bounds = Bounds::new(&self.output, made.vertices(), workspace);
+        let mut bounds = Bounds::new(output, made.vertices(), workspace);
         made.read(&mut bounds, workspace)?;
-        let (about, shift) = self.about(&source, made, bounds.corners(), workspace)?;
+        let like = Like {
+            mesh: &self.mesh,
+            source: &source,
+            output,
+        };
+        let counts = [made.vertices(), made.triangles()];
+        let (about, shift) = like.about(counts, bounds.corners(), workspace)?;
         let all = about.bounds.unwrap_or_default();
         let largest = all.as_flattened().iter();
         let largest = largest.fold(0.0, |most: f64, x| most.max(x.abs()));
         let observer = &workspace.observer;
-        for warning in export::left_out(&self.output, &about, largest, &**observer)? {
+        for warning in export::left_out(output, &about, largest, &**observer)? {
             observer.warn(&warning);
         }
-        write(&self.output, (about, shift), workspace, |writer| {
+        write(output, (about, shift), workspace, |writer| {
             made.read(writer, workspace)
         })
-    }
-
-    /// The properties of the file, and what its coordinates are less than those of the mesh.
-    fn about(
-        &self,
-        source: &PlyMesh,
-        made: &Simplified,
-        corners: Option<[[f64; 3]; 2]>,
-        workspace: &Workspace,
-    ) -> Result<(Mesh, [f64; 3])> {
-        let format = export::format_of(&self.output)?;
-        let [low, high] = corners.unwrap_or_default();
-        // Coordinates of a format without doubles are told from the corner of the mesh, if those of the file are doubles.
-        let is_moved = !source.has_floats() && !format.holds_doubles();
-        let shift = match is_moved {
-            true => low.map(f64::floor),
-            false => [0.0; 3],
-        };
-        if shift != [0.0; 3] {
-            let ([x, y, z], name) = (shift, format.name());
-            workspace.observer.warn(&format!(
-                "{name} holds 32-bit floats: its coordinates are those of the mesh less {x} {y} {z}"
-            ));
-        }
-        let mut comments = system(&self.mesh)?.comments();
-        if source.origin().is_some() || is_moved {
-            let origin = source.origin().unwrap_or_default();
-            let place = [0, 1, 2].map(|k| origin[k] + shift[k]);
-            comments.extend(Place::new(place, None).comments());
-        }
-        let columns = source.columns().into_iter();
-        let columns = columns.map(|(_, name, scalar)| VertexColumn {
-            name: name.to_owned(),
-            scalar,
-        });
-        let moved = |corner: [f64; 3]| [0, 1, 2].map(|k| corner[k] - shift[k]);
-        let span = (0..3).fold(1e-9, |most: f64, k| most.max(high[k] - low[k]));
-        let about = Mesh {
-            vertices: made.vertices(),
-            triangles: made.triangles(),
-            coordinates: match source.has_floats() {
-                true => CoordinateType::Float,
-                false => CoordinateType::Double,
-            },
-            columns: columns.collect(),
-            comments,
-            bounds: corners.map(|corners| corners.map(moved)),
-            // A hundred-millionth of the span, about.
-            decimals: (8.0 - span.log10().ceil()).clamp(0.0, 17.0) as usize,
-            ..Mesh::default()
-        };
-        Ok((about, shift))
     }
 }

@@ -1,6 +1,7 @@
 //! Levels of detail: tilesets are read back and compared with their meshes.
 
 mod checks;
+mod closed;
 mod globe;
 mod meshes;
 mod resumed;

@@ -251,6 +251,16 @@ fn a_cloud_becomes_a_small_mesh_at_once() {
     assert!(bytes("small.ply") == bytes("want.ply"));
     // Nothing else is left.
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 4);
+    // Smaller and closed.
+    let params = outcrop::Params {
+        triangles: Some(1000),
+        close: Some(outcrop::Close::Lids),
+        ..outcrop::Params::default()
+    };
+    let both = run("both.ply", None).params(params).build().unwrap();
+    let made = both.run().unwrap().simplified.unwrap();
+    assert!(made.closed.is_some());
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 5);
     for (output, triangles) in [
         ("small.ply", 0),
         ("small.ply.zst", 9),

@@ -18,13 +18,13 @@ fn job(mesh: &Path, output: &Path, goal: Goal, most: u32) -> Simplification {
         .threads(2)
 }
 
-fn read(path: &Path) -> outcrop_ply::Mesh {
+pub fn read(path: &Path) -> outcrop_ply::Mesh {
     let bytes = std::fs::read(path).unwrap();
     outcrop_ply::Mesh::read(&bytes[..], bytes.len() as u64).unwrap()
 }
 
 /// Edges with their numbers of triangles, each way.
-fn edges(triangles: &[[u32; 3]]) -> BTreeMap<[u32; 2], [u32; 2]> {
+pub fn edges(triangles: &[[u32; 3]]) -> BTreeMap<[u32; 2], [u32; 2]> {
     let mut edges = BTreeMap::new();
     for [a, b, c] in triangles {
         for [a, b] in [[*a, *b], [*b, *c], [*c, *a]] {
@@ -37,7 +37,7 @@ fn edges(triangles: &[[u32; 3]]) -> BTreeMap<[u32; 2], [u32; 2]> {
 
 /// Checks that it is an oriented manifold without unused vertices; returns its boundary edges and its Euler
 /// characteristic.
-fn shape(vertices: usize, triangles: &[[u32; 3]]) -> (usize, i64) {
+pub fn shape(vertices: usize, triangles: &[[u32; 3]]) -> (usize, i64) {
     let edges = edges(triangles);
     assert!(edges.values().all(|[a, b]| *a <= 1 && *b <= 1));
     let used: BTreeSet<u32> = triangles.as_flattened().iter().copied().collect();

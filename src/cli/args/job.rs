@@ -1,6 +1,7 @@
 //! The points, the mesh, and what decides it.
 
 use super::super::parse::{count, region, system};
+use crate::params::Close as Closed;
 use crate::params::{
     Facing, InputNormals, MaxWidth, Method, Origin, Params, Radius, Region, Smooth, Smoothing,
 };
@@ -241,6 +242,10 @@ pub struct Job {
     /// Simplify the mesh to this number of triangles, e.g. 2e6, as `outcrop simplify` does
     #[arg(long, value_name = "N", value_parser = count)]
     pub triangles: Option<u64>,
+    /// Close the boundary, as `outcrop close` does: auto (smooth where the surface runs on into the hole, else a lid),
+    /// lids, smooth, or base (walls from outer rims down to a floor) [without a value: auto]
+    #[arg(long, value_name = "auto|lids|smooth|base[=Z]", num_args = 0..=1, default_missing_value = "auto")]
+    pub close: Option<Closed>,
     #[command(flatten)]
     pub points: Points,
     #[command(flatten)]
@@ -286,6 +291,7 @@ impl Job {
             crop_margin: selected.crop_margin,
             split: self.split,
             triangles: self.triangles,
+            close: self.close,
             attributes: self.columns.attributes.clone(),
             wide_colors: self.columns.wide_colors,
             thin: self.filters.thin,

@@ -1,4 +1,4 @@
-//! Triangles without area, found without random access to positions.
+//! Triangles without area, and the volume, found without random access to positions.
 //!
 //! A triangle is examined in the range of its highest corner. Positions that are not in memory there are
 //! found later: the triangle, with the positions known so far, is sent down to the ranges of its other
@@ -8,6 +8,7 @@ use super::buckets::Buckets;
 use super::collinear::collinear;
 use super::plan::Plan;
 use super::positions::Positions;
+use super::volume::Volume;
 use outcrop_disk::error::Result;
 use outcrop_disk::spill::row;
 use outcrop_disk::workspace::Workspace;
@@ -19,6 +20,10 @@ row! {
         middle: u32,
         /// The lowest corner.
         low: u32,
+        /// 1 if the triangle runs from the highest corner to the lowest, else 0.
+        is_turned: u32,
+        /// Zero.
+        unused: u32,
         /// Position of the highest corner.
         high_at: [f64; 3],
         /// Position of the middle corner, if it is known.
@@ -38,15 +43,17 @@ pub(super) struct Areas {
     travelling: Buckets<Travelling>,
     /// Triangles without area so far.
     pub(super) zero: u64,
+    /// The volume so far.
+    pub(super) volume: Volume,
 }
 
 impl Areas {
-    /// With `zero` triangles that are found already.
+    /// With `zero` triangles that are found already, and their `volume`.
     pub(super) fn new(
         workspace: &Workspace,
         plan: &Plan,
         positions: Positions,
-        zero: u64,
+        (zero, volume): (u64, Volume),
     ) -> Result<Self> {
         let name = "verify.areas";
         Ok(Self {
@@ -54,6 +61,7 @@ impl Areas {
             positions,
             travelling: Buckets::new(workspace, name, plan.ranges, plan.blocks[2])?,
             zero,
+            volume,
         })
     }
 
@@ -67,7 +75,7 @@ impl Areas {
                     KNOWN => Some(row.middle_at),
                     vertex => self.positions.get(vertex),
                 };
-                self.go_on(row.middle, row.low, row.high_at, middle)?;
+                self.go_on(row, row.high_at, middle)?;
             }
         }
         self.travelling.clear(k);
@@ -81,32 +89,42 @@ impl Areas {
             let mut sorted = triangle;
             sorted.sort_unstable();
             let [low, middle, high] = sorted;
+            let at = triangle.iter().position(|v| *v == high).unwrap_or(0);
+            let way = Travelling {
+                middle,
+                low,
+                is_turned: u32::from(triangle[(at + 1) % 3] == low),
+                ..Travelling::default()
+            };
             if high.wrapping_sub(first) as usize >= length {
                 continue;
             }
             if let Some(position) = self.positions.get(high) {
-                self.go_on(middle, low, position, self.positions.get(middle))?;
+                self.go_on(&way, position, self.positions.get(middle))?;
             }
         }
         Ok(())
     }
 
-    fn go_on(
-        &mut self,
-        middle: u32,
-        low: u32,
-        high: [f64; 3],
-        known: Option<[f64; 3]>,
-    ) -> Result<()> {
+    fn go_on(&mut self, way: &Travelling, high: [f64; 3], known: Option<[f64; 3]>) -> Result<()> {
+        let (middle, low) = (way.middle, way.low);
         if let (Some(known), Some(lowest)) = (known, self.positions.get(low)) {
             let corners = [high, known, lowest];
             let finite = corners.iter().flatten().all(|c| c.is_finite());
             self.zero += u64::from(finite && collinear(corners));
+            if finite {
+                self.volume.add(match way.is_turned {
+                    0 => corners,
+                    _ => [high, lowest, known],
+                });
+            }
             return Ok(());
         }
         let row = Travelling {
             middle: if known.is_some() { KNOWN } else { middle },
             low,
+            is_turned: way.is_turned,
+            unused: 0,
             high_at: high,
             middle_at: known.unwrap_or_default(),
         };

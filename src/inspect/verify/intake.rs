@@ -9,6 +9,7 @@ use super::plan::Plan;
 use super::positions::Positions;
 use super::star::Tally;
 use super::verdict::Verdict;
+use super::volume::Volume;
 use outcrop_codecs::ply_mesh::{PlyMesh, Sink};
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::Workspace;
@@ -31,6 +32,8 @@ pub(super) struct Intake<'a> {
     /// Counts of the vertices that are examined already, and triangles without area there.
     pub(super) tally: Tally,
     pub(super) zero_area: u64,
+    /// The volume of these triangles.
+    pub(super) volume: Volume,
     /// The vertices that are not examined yet, with their memory; all if there is none.
     pub(super) shared: Option<(Shared, Reservation)>,
 }
@@ -66,6 +69,7 @@ impl<'a> Intake<'a> {
             boundary: Contraction::new(workspace, plan, "verify.boundary")?,
             tally: Tally::default(),
             zero_area: 0,
+            volume: Volume::default(),
             shared: None,
         })
     }
@@ -103,6 +107,9 @@ impl<'a> Intake<'a> {
 impl Sink for Intake<'_> {
     fn vertices(&mut self, positions: &[[f64; 3]]) -> Result<()> {
         self.workspace.check_cancel()?;
+        if let (0, Some(first)) = (self.verdict.vertices, positions.first()) {
+            self.volume = Volume::from(*first);
+        }
         self.verdict.vertices += positions.len() as u64;
         self.note(positions);
         self.positions.append(positions)?;

@@ -27,6 +27,7 @@ mod sweep;
 #[cfg(test)]
 mod tests;
 mod verdict;
+mod volume;
 
 pub use bounds::Bounds;
 #[cfg(feature = "pictures")]

@@ -9,6 +9,7 @@ use super::intake::Intake;
 use super::piece::Piece;
 use super::plan::Plan;
 use super::verdict::Verdict;
+use super::volume::Volume;
 use outcrop_codecs::ply_mesh::{AnyPlace, PlyMesh};
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::{Workspace, lock};
@@ -69,7 +70,12 @@ pub(super) fn read<'a>(
     };
     let total = u64::from(division.vertices) + division.faces;
     observer.begin("read mesh", "vertices and faces", total);
-    let intake = Mutex::new(Intake::of_pieces(plan, workspace)?);
+    let mut first = Vec::new();
+    mesh.positions((0, 1), &mut Vec::new(), &mut first)?;
+    let mut intake = Intake::of_pieces(plan, workspace)?;
+    intake.volume = Volume::from(first[0]);
+    let origin = intake.volume.origin;
+    let intake = Mutex::new(intake);
     let spare = Mutex::new(Vec::<Piece>::new());
     let size = Piece::bytes(&division, mesh.entries());
     let name = "verify: piece of the mesh";
@@ -80,6 +86,7 @@ pub(super) fn read<'a>(
         |unit| {
             let _held = unit.hold(size);
             let mut piece = lock(&spare).pop().unwrap_or_default();
+            piece.found.volume.origin = origin;
             let advance = |count| unit.advance(count);
             piece.examine(mesh, (&homes, &shared), unit.number(), advance)?;
             lock(&intake).take(&mut piece, &homes)?;
@@ -124,6 +131,7 @@ impl Intake<'_> {
         self.surface.complete += found.complete[0];
         self.boundary.complete += found.complete[1];
         self.zero_area += found.zero_area;
+        self.volume.join(&found.volume);
         let verdict = &mut self.verdict;
         *verdict = Verdict {
             vertices: verdict.vertices,

@@ -6,6 +6,7 @@ use super::collinear::collinear;
 use super::homes::{AT_A_TIME, AWAY, Division, Homes, Shared};
 use super::places::Kind;
 use super::star::{self, Inspector, NO_MORE, scratch_bytes};
+use super::volume::Volume;
 use outcrop_codecs::ply_mesh::AnyPlace;
 use outcrop_disk::error::Result;
 
@@ -25,6 +26,8 @@ pub(super) struct Found {
     pub(super) degenerate: u64,
     /// Triangles without area.
     pub(super) zero_area: u64,
+    /// The volume of triangles without a shared corner.
+    pub(super) volume: Volume,
     /// Vertices with coordinates that are not finite; the box around the others.
     pub(super) non_finite: u64,
     pub(super) bounds: Option<Bounds>,
@@ -123,6 +126,7 @@ impl Piece {
         self.found = Found {
             open: std::mem::take(&mut self.found.open),
             edges: std::mem::take(&mut self.found.edges),
+            volume: Volume::from(self.found.volume.origin),
             ..Found::default()
         };
         self.found.open.clear();
@@ -197,6 +201,9 @@ impl Piece {
                 let corners = local.map(|at| self.positions[at as usize]);
                 let finite = corners.iter().flatten().all(|c| c.is_finite());
                 found.zero_area += u64::from(finite && collinear(corners));
+                if finite {
+                    found.volume.add(corners);
+                }
             }
             if let Some(first) = home.clone().next() {
                 home.for_each(|at| join(surface, first as u32, at as u32));

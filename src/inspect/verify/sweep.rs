@@ -41,7 +41,12 @@ pub(super) fn run(
     let mut sweep = Sweep {
         plan,
         workspace,
-        areas: Areas::new(workspace, plan, intake.positions, intake.zero_area)?,
+        areas: Areas::new(
+            workspace,
+            plan,
+            intake.positions,
+            (intake.zero_area, intake.volume),
+        )?,
         triangles: intake.triangles,
         corners: Corners::default(),
         forest: Forest::default(),
@@ -67,6 +72,7 @@ pub(super) fn run(
         pinched_vertices: tally.pinched_vertices,
         unreferenced_vertices: intake.verdict.vertices - tally.referenced,
         zero_area_triangles: sweep.areas.zero,
+        volume: sweep.areas.volume.value(),
         edges: tally.edges,
         boundary_edges: tally.boundary_edges,
         boundary_loops: sweep.boundary.complete,

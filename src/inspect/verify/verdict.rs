@@ -54,6 +54,11 @@ pub struct Verdict {
     /// Handles, summed over all components, each boundary loop taken as filled by a disk. Absent
     /// without triangles, and if the mesh is not an oriented manifold.
     pub genus: Option<u64>,
+    /// True if every edge has two triangles, which run along it in opposite directions.
+    pub closed: bool,
+    /// The volume that a closed mesh encloses, in the cube of its unit: negative if its triangles face inwards, and
+    /// counted twice where it overlaps itself. Absent for meshes that are not closed.
+    pub volume: Option<f64>,
     /// Box around the finite vertices, in the coordinates of the cloud; absent if there is none.
     pub bounds: Option<Bounds>,
     /// The position of the cloud that is the origin of the coordinates in the file; absent if the header gives
@@ -76,10 +81,19 @@ impl Verdict {
             + self.pinched_vertices;
         // χ = 2 (components − genus) − boundary loops
         let twice = 2 * self.components as i64 - self.boundary_loops as i64 - euler;
+        let is_oriented = surface_defects == 0 && sound > 0;
+        // A pinched vertex opens nothing.
+        let closed = self.boundary_edges == 0
+            && sound > 0
+            && surface_defects == self.pinched_vertices + self.repeated_triangles;
         let verdict = Self {
+            closed,
+            volume: self
+                .volume
+                .filter(|_| closed && self.non_finite_vertices == 0),
             unreferenced_allowed: options.allow_unreferenced,
             euler_characteristic: euler,
-            genus: (surface_defects == 0 && sound > 0).then_some(twice.max(0) as u64 / 2),
+            genus: is_oriented.then_some(twice.max(0) as u64 / 2),
             ..self
         };
         let manifold = verdict.defects().iter().all(|(_, count)| *count == 0);
@@ -119,6 +133,7 @@ impl fmt::Display for Verdict {
         for (name, count) in self.defects().into_iter().filter(|(_, count)| *count > 0) {
             writeln!(f, "  {name:<38}{count:>14}")?;
         }
+        writeln!(f, "closed: {}", if self.closed { "yes" } else { "no" })?;
         let genus = self.genus.map_or("-".to_owned(), |g| g.to_string());
         let counts: [(&str, &dyn fmt::Display); 9] = [
             ("vertices", &self.vertices),
@@ -136,6 +151,9 @@ impl fmt::Display for Verdict {
         ];
         for (name, count) in counts {
             writeln!(f, "{name:<40}{count:>14}")?;
+        }
+        if let Some(volume) = self.volume {
+            writeln!(f, "{:<40}{volume:>14.6}", "volume")?;
         }
         if self.unreferenced_allowed {
             let (name, count) = (

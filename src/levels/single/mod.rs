@@ -95,6 +95,12 @@ impl Stored for Columns {
 /// Names of columns of integers that are quantities.
 const BLENDED: [&str; 5] = ["red", "green", "blue", "alpha", "intensity"];
 
+/// True if a vertex between others has a mean of their values in the column with this name and type.
+#[must_use]
+pub fn is_blended(name: &str, scalar: Scalar) -> bool {
+    matches!(scalar, Scalar::F32 | Scalar::F64) || BLENDED.contains(&name)
+}
+
 type Intake = intake::Intake<Columns>;
 
 /// A mesh that was simplified; it lies in the scratch folder.
@@ -168,9 +174,6 @@ fn read(path: &Path, workspace: &Workspace) -> Result<(Intake, u64)> {
     workspace.once("read", |unit| {
         let mesh = PlyMesh::open_any(path, workspace)?;
         let all = mesh.columns();
-        let is_blended = |name: &str, scalar: Scalar| {
-            matches!(scalar, Scalar::F32 | Scalar::F64) || BLENDED.contains(&name)
-        };
         let columns = Columns {
             wanted: all.iter().map(|c| (c.0, c.2)).collect(),
             blended: all.iter().map(|c| is_blended(c.1, c.2)).collect(),

@@ -53,6 +53,11 @@ pub trait MeshFormat: Sync {
         false
     }
 
+    /// True if the file can tell which triangles close the mesh.
+    fn holds_filled(&self) -> bool {
+        false
+    }
+
     /// True if vertices have this column in the file; others are left out.
     fn holds(&self, mesh: &Mesh, column: &VertexColumn) -> bool;
 
@@ -109,6 +114,8 @@ pub struct Mesh {
     pub decimals: usize,
     /// GLB with meshopt compression.
     pub compress: bool,
+    /// Whether the triangles that are put next close the mesh; none if the file does not tell it of its triangles.
+    pub filled: Option<bool>,
 }
 
 impl Mesh {

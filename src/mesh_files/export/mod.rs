@@ -195,6 +195,7 @@ impl ExportOptions<'_> {
             bounds: None,
             decimals: self.decimals,
             compress: self.compress,
+            filled: None,
         };
         // Columns that the format does not hold are not made.
         mesh.columns = mesh

@@ -6,6 +6,9 @@ use outcrop_ply::{Encoding, Scalar, TRIANGLE, put_triangle};
 /// Binary little-endian PLY.
 pub struct Ply;
 
+/// The last line of a header.
+const END: &str = "end_header\n";
+
 impl MeshFormat for Ply {
     fn name(&self) -> &'static str {
         "PLY"
@@ -16,6 +19,10 @@ impl MeshFormat for Ply {
     }
 
     fn holds_doubles(&self) -> bool {
+        true
+    }
+
+    fn holds_filled(&self) -> bool {
         true
     }
 
@@ -46,8 +53,14 @@ impl MeshFormat for Ply {
             triangles: Some((mesh.triangles, index)),
         };
         let vertex = 3 * coordinates.bytes() + mesh.value_bytes();
-        let header = layout.header().into_bytes();
-        Layout::of(header, mesh, vertex as u64, TRIANGLE as u64)
+        let mut header = layout.header();
+        let mut triangle = TRIANGLE as u64;
+        if mesh.filled.is_some() {
+            let lines = header.strip_suffix(END).unwrap_or(&header);
+            header = format!("{lines}property uchar filled\n{END}");
+            triangle += 1;
+        }
+        Layout::of(header.into_bytes(), mesh, vertex as u64, triangle)
     }
 
     fn put_vertices(
@@ -74,12 +87,15 @@ impl MeshFormat for Ply {
 
     fn put_triangles(
         &self,
-        _: &Mesh,
+        mesh: &Mesh,
         triangles: &[[u32; 3]],
         _: &[Positions],
         bytes: &mut Vec<u8>,
     ) {
-        triangles.iter().for_each(|t| put_triangle(*t, bytes));
+        for t in triangles {
+            put_triangle(*t, bytes);
+            bytes.extend(mesh.filled.map(u8::from));
+        }
     }
 }
 

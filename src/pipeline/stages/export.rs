@@ -1,7 +1,7 @@
 //! The last stage: the mesh file, the origin of its coordinates, and what is beside it.
 
 use super::super::origin::Steps;
-use super::super::{beside, levels};
+use super::super::{beside, levels, made};
 use super::Stages;
 use crate::params::Origin;
 use outcrop_disk::error::{Result, Setting};
@@ -113,12 +113,29 @@ impl Stages<'_> {
         self.report.mesh = self.clock.stage("export", "blocks", items, write)?;
         columns.map_or(Ok(()), |columns| columns.release(workspace))?;
         let wkt = self.wkt.as_deref();
-        let named = match job.params.triangles {
-            Some(_) => &job.output,
-            None => &job.mesh,
-        };
-        let warnings = beside::write(named, &job.inputs, &self.report, wkt)?;
+        let mesh = job.made.as_ref().unwrap_or(&job.mesh);
+        let warnings = beside::write(mesh, &job.inputs, &self.report, wkt)?;
         warnings.into_iter().for_each(|warning| self.warn(warning));
+        Ok(())
+    }
+
+    /// The mesh that is made of the whole one, with fewer triangles or closed, if it is wanted.
+    pub fn make_of_whole(&mut self) -> Result<()> {
+        let (job, workspace) = (self.job, self.workspace);
+        let Some(output) = &job.made else {
+            return Ok(());
+        };
+        workspace.trim();
+        let triangles = self.report.mesh.triangles;
+        if let Some(wanted) = job.params.triangles {
+            let how = (wanted, job.params.close);
+            let make = || made::simplify(&job.mesh, output, how, workspace);
+            let made = self.clock.stage("simplify", "triangles", triangles, make)?;
+            self.report.simplified = Some(made);
+        } else if let Some(kind) = job.params.close {
+            let make = || made::close(&job.mesh, output, kind, workspace);
+            self.report.closed = Some(self.clock.stage("close", "triangles", triangles, make)?);
+        }
         Ok(())
     }
 
@@ -134,20 +151,6 @@ impl Stages<'_> {
         let make = || levels::make(&job.mesh, &source, folder, workspace);
         let triangles = self.report.mesh.triangles;
         self.report.tiles = Some(self.clock.stage("tiles", "triangles", triangles, make)?);
-        Ok(())
-    }
-
-    /// The mesh with fewer triangles, if it is wanted.
-    pub fn simplify(&mut self) -> Result<()> {
-        let (job, workspace) = (self.job, self.workspace);
-        let Some(wanted) = job.params.triangles else {
-            return Ok(());
-        };
-        workspace.trim();
-        let make = || levels::simplify(&job.mesh, &job.output, wanted, workspace);
-        let triangles = self.report.mesh.triangles;
-        let made = self.clock.stage("simplify", "triangles", triangles, make)?;
-        self.report.simplified = Some(made);
         Ok(())
     }
 }
