@@ -169,12 +169,6 @@ impl Near<'_> {
         }
         Ok(all)
     }
-
-    /// Deletes the surroundings.
-    pub fn release(self, workspace: &Workspace) -> Result<()> {
-        drop(self.inbox);
-        workspace.files.release("close.near")
-    }
 }
 
 fn empty(rows: &[LoopVertex]) -> Placed {
