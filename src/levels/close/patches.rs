@@ -119,7 +119,7 @@ pub(super) fn close(
     observer.begin("close loops", "edges", all);
     let mut closings = Vec::new();
     workspace.units(
-        (format!("close patches {number}"), "close: patches"),
+        (format!("patches {number}"), "close: patches"),
         batches,
         |batch| near.bytes(batch) + bytes(near.batch(batch).longest, wish.shape),
         |unit| one(unit, near, wish, &patches),
@@ -221,6 +221,10 @@ impl Made {
             let points: [V3; 3] = corners.map(point);
             let [a, b, c] = points;
             area += norm(cross(sub(b, a), sub(c, a))) / 2.0;
+            let positions = corners.map(|v| match v.checked_sub(n) {
+                None => placed.exact[v as usize],
+                Some(new) => add(patch.new[new as usize], placed.origin),
+            });
             let (mask, corners) = numbered(*corners);
             self.triangles.push(PatchTriangle {
                 number,
@@ -230,7 +234,7 @@ impl Made {
             self.placed.push(PlacedPatch {
                 number,
                 unused: 0,
-                positions: points.map(|p| add(p, placed.origin)),
+                positions,
             });
         }
         area
