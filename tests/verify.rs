@@ -252,7 +252,9 @@ fn summary_and_json() {
     assert!(text.starts_with("manifold: yes\nvertices "), "{text}");
     assert!(text.ends_with("box  0 0 0  to  1 1 1"), "{text}");
     let widths: Vec<_> = text.lines().skip(1).map(str::len).collect();
-    assert!(widths[..9].iter().all(|w| *w == 54), "{text}");
+    assert!(widths[..11].iter().all(|w| *w == 54), "{text}");
+    assert!(text.contains(&format!("\n{:<40}{:>14}\n", "closed", "yes")));
+    assert_eq!((verdict.closed, verdict.volume), (true, Some(1.0)));
     let json = serde_json::to_value(verdict).unwrap();
     assert_eq!(json["edges"], 18);
     assert_eq!(json["manifold"], true);

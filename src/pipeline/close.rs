@@ -104,6 +104,11 @@ pub(super) fn closed(
     kind: Kind,
     workspace: &Workspace,
 ) -> Result<CloseReport> {
+    // When all is done, the files of the steps inside may be gone.
+    workspace.once("close", |_| make(mesh, output, kind, workspace))
+}
+
+fn make(mesh: &Path, output: &Path, kind: Kind, workspace: &Workspace) -> Result<CloseReport> {
     let closure = close::close(mesh, kind, workspace)?;
     let all = closure.stats.all();
     let report = CloseReport {
@@ -117,9 +122,7 @@ pub(super) fn closed(
     let observer = &workspace.observer;
     observer.begin("write", "triangles", report.triangles);
     let files = (mesh, output);
-    workspace.once("close write", |_| {
-        written(files, &closure, &report, workspace)
-    })?;
+    workspace.once("write", |_| written(files, &closure, &report, workspace))?;
     observer.end();
     Ok(report)
 }

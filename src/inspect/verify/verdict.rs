@@ -133,7 +133,6 @@ impl fmt::Display for Verdict {
         for (name, count) in self.defects().into_iter().filter(|(_, count)| *count > 0) {
             writeln!(f, "  {name:<38}{count:>14}")?;
         }
-        writeln!(f, "closed: {}", if self.closed { "yes" } else { "no" })?;
         let genus = self.genus.map_or("-".to_owned(), |g| g.to_string());
         let counts: [(&str, &dyn fmt::Display); 9] = [
             ("vertices", &self.vertices),
@@ -152,6 +151,8 @@ impl fmt::Display for Verdict {
         for (name, count) in counts {
             writeln!(f, "{name:<40}{count:>14}")?;
         }
+        let closed = if self.closed { "yes" } else { "no" };
+        writeln!(f, "{:<40}{closed:>14}", "closed")?;
         if let Some(volume) = self.volume {
             writeln!(f, "{:<40}{volume:>14.6}", "volume")?;
         }

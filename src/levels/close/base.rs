@@ -72,7 +72,7 @@ pub(super) fn plan(
     };
     let mut outlines = Vec::new();
     workspace.units(
-        ("close outlines", "close: outlines"),
+        ("outlines", "close: outlines"),
         near.batches(),
         |batch| near.bytes(batch),
         |unit| {
@@ -124,7 +124,7 @@ fn bounds(source: &Source, workspace: &Workspace) -> Result<[V3; 2]> {
     let mut all = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
     let count = source.vertices.div_ceil(RANGE) as usize;
     workspace.units(
-        ("close bounds", "close: bounds"),
+        ("bounds", "close: bounds"),
         count,
         |_| READER,
         |unit| {

@@ -103,7 +103,7 @@ pub(super) fn find(
         observer.begin("find crossings", "triangles", source.triangles);
         workspace.units(
             (
-                format!("close crossings {step} {number}"),
+                format!("crossings {step} {number}"),
                 "close: crossings of ranges",
             ),
             ranges + batches,

@@ -2,7 +2,8 @@
 //! and those of the rim is least, where the triangles of the mesh around the rim count too. Conjugate gradients find
 //! it, in double precision, one thread for a patch, so that the result is the same everywhere.
 
-use super::lid::{Loop, norm};
+use super::lid::Loop;
+use super::meet::norm;
 use outcrop_geom::vector::{V3, cross, dot, sub};
 
 /// Least weight of an edge, as a cotangent: obtuse triangles would pull the wrong way.

@@ -1,11 +1,15 @@
 //! A loop closed without new vertices: by the triangulation of least weight if it is short, else by ears.
 
 use super::ears::clip;
+use super::meet::norm;
 use outcrop_geom::vector::{V3, add, cross, dot, scale, sub};
 
 /// Longest loop whose triangulation of least weight is sought: its time grows with the cube of the length. At 100 it
 /// takes 10 ms.
 const EXACT: usize = 100;
+
+/// Longest loop of which the triangulation of least area is sought, if its lid crosses something: it takes 2 s.
+pub(super) const TAUT: usize = 600;
 
 /// A boundary loop, counter-clockwise as the triangles that close it see it.
 #[derive(Debug, Clone, Default)]
@@ -75,9 +79,17 @@ impl Loop {
     }
 }
 
-/// The length of a vector.
-pub(super) fn norm(v: V3) -> f64 {
-    dot(v, v).sqrt()
+/// The triangles between the vertices of a loop whose area is least; none of a loop that is too long, or if the mesh
+/// has edges where they would be.
+pub(super) fn taut(around: &Loop) -> Option<Patch> {
+    if around.len() > TAUT || around.is_triangle {
+        return None;
+    }
+    let triangles = least(around, false)?;
+    Some(Patch {
+        triangles,
+        ..Patch::default()
+    })
 }
 
 /// Closes a loop without new vertices; only where no edge is left that the mesh allows, around one new vertex.
@@ -87,7 +99,7 @@ pub(super) fn lid(around: &Loop) -> Patch {
         return with_fan(around, Vec::new(), &[0, 1, 2]);
     }
     if n <= EXACT
-        && let Some(triangles) = least(around)
+        && let Some(triangles) = least(around, true)
     {
         return Patch {
             triangles,
@@ -161,8 +173,9 @@ fn less(a: Weight, b: Weight) -> bool {
     a.0 < b.0 || a.0 == b.0 && a.1 < b.1
 }
 
-/// The triangulation of least weight (Liepa 2003): the sharpest fold is as blunt as it can be, then the area is least.
-fn least(around: &Loop) -> Option<Vec<[u32; 3]>> {
+/// The triangulation of least weight (Liepa 2003): the sharpest fold is as blunt as it can be, unless folds do not
+/// count, then the area is least.
+fn least(around: &Loop, folds: bool) -> Option<Vec<[u32; 3]>> {
     let n = around.len();
     let p = &around.points;
     let unit = |a: V3, b: V3, c: V3| {
@@ -199,13 +212,14 @@ fn least(around: &Loop) -> Option<Vec<[u32; 3]>> {
                         Some(normal)
                     };
                     let fold = other.map_or(1.0, |other| 1.0 - dot(normal, other));
+                    let fold = if folds { fold } else { 0.0 };
                     weight.0 = weight.0.max(fold);
                     true
                 };
                 if !side(i, m) || !side(m, k) {
                     continue;
                 }
-                if closes {
+                if closes && folds {
                     let fold = edge[n - 1].map_or(1.0, |other| 1.0 - dot(normal, other));
                     weight.0 = weight.0.max(fold);
                 }

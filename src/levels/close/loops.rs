@@ -99,7 +99,7 @@ impl Linked {
 
 /// Links the boundary to loops.
 pub(super) fn link(rim: &Rim, workspace: &Workspace) -> Result<Loops> {
-    let loops = workspace.once("close loops", |unit| {
+    let loops = workspace.once("loops", |unit| {
         let _held = workspace.reserve("close: loops", rim.edges * EACH + (1 << 20))?;
         let mut edges = Vec::with_capacity(rim.edges as usize);
         for section in 0..rim.sections {

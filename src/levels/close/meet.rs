@@ -1,9 +1,14 @@
-//! Whether two triangles cross.
+//! Lengths, and whether two triangles cross.
 
 use outcrop_geom::vector::{V3, cross, dot, sub};
 
 /// Corners of a triangle.
 pub(super) type Corners = [V3; 3];
+
+/// The length of a vector.
+pub(super) fn norm(v: V3) -> f64 {
+    dot(v, v).sqrt()
+}
 
 /// The side of `d` from the plane of `a`, `b` and `c`: 0 if rounding may decide.
 fn side(a: V3, b: V3, c: V3, d: V3) -> i8 {

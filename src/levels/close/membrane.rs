@@ -1,7 +1,8 @@
 //! A loop closed smoothly: its lid, refined and faired from coarse to fine.
 
 use super::fair::{Ring, fair};
-use super::lid::{Loop, Patch, lid, norm};
+use super::lid::{Loop, Patch, lid};
+use super::meet::norm;
 use super::refine::Net;
 use outcrop_geom::vector::{cross, sub};
 
@@ -16,6 +17,13 @@ const GROWTH: f64 = 1.3;
 
 /// Most new vertices of a loop.
 pub(super) const MOST: usize = 1 << 16;
+
+/// How often the patch is refined, flipped and faired as it lies: its triangles then have the shapes by which its
+/// curvature is measured.
+const AGAIN: usize = 3;
+
+/// Largest number of new vertices as a multiple of those of a flat patch: half a sphere has twice the area.
+const BULGE: f64 = 3.0;
 
 /// Rounds of conjugate gradients after each refinement, and after the last: more move no vertex by a hundredth of its
 /// spacing.
@@ -44,22 +52,26 @@ pub(super) fn membrane(around: &Loop, ring: &Ring) -> Patch {
     let growth = if wanted > FINE { GROWTH } else { 1.0 };
     let mut net = Net::of(around, patch, growth);
     net.relax();
-    loop {
-        let split = net.split(n + MOST);
+    while net.split(n + MOST) {
         net.relax();
-        let rounds = if split { ROUNDS } else { LAST };
-        let Net {
-            points, triangles, ..
-        } = &mut net;
-        fair(around, ring, points, triangles, rounds);
-        if !split {
-            break;
-        }
+        faired(&mut net, ring, ROUNDS);
     }
-    net.relax();
-    let Net {
-        points, triangles, ..
-    } = &mut net;
-    fair(around, ring, points, triangles, LAST);
+    net.on_lid = false;
+    let most = n + (BULGE * wanted).min(MOST as f64) as usize;
+    for _ in 0..AGAIN {
+        net.split(most);
+        net.relax();
+        faired(&mut net, ring, LAST);
+    }
     net.finish()
+}
+
+fn faired(net: &mut Net<'_>, ring: &Ring, rounds: usize) {
+    let Net {
+        around,
+        points,
+        triangles,
+        ..
+    } = net;
+    fair(around, ring, points, triangles, rounds);
 }

@@ -20,9 +20,10 @@ mod rim;
 mod rows;
 mod source;
 
+use base::Base;
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::Workspace;
-use patches::{Closing, Patches, Wish};
+use patches::{Closing, Patches, Shape, Wish};
 use serde::{Deserialize, Serialize};
 use source::Source;
 use std::collections::BTreeMap;
@@ -143,7 +144,7 @@ pub fn close(path: &Path, kind: Kind, workspace: &Workspace) -> Result<Closure> 
     let base = base::plan(&source, &near, kind, workspace)?;
     let wish = Wish {
         number: 0,
-        kind,
+        shape: Shape::Wanted(kind),
         base: &base,
         only: None,
     };
@@ -154,12 +155,12 @@ pub fn close(path: &Path, kind: Kind, workspace: &Workspace) -> Result<Closure> 
         closings: closings.into_iter().collect(),
         chosen: BTreeMap::new(),
         crossing: BTreeMap::new(),
+        flattened: 0,
     };
     workspace.trim();
     made.test(workspace)?;
-    made.flatten(&near, &wish, workspace)?;
-    near.release(workspace)?;
-    loops.table.release(workspace)?;
+    made.again(&near, (&base, Shape::Lid), workspace)?;
+    made.again(&near, (&base, Shape::Taut), workspace)?;
     let stats = ClosingStats {
         pinched: loops.pinched,
         crowded,
@@ -173,9 +174,6 @@ pub fn close(path: &Path, kind: Kind, workspace: &Workspace) -> Result<Closure> 
         chosen: made.chosen,
         batches: loops.batches.len(),
     };
-    for patches in &closure.tries {
-        patches.release_placed(workspace)?;
-    }
     closure.stats.vertices = closure.count(workspace)?;
     Ok(closure)
 }
@@ -188,6 +186,8 @@ struct Tried<'a> {
     chosen: BTreeMap<u32, usize>,
     /// Loops whose patch crosses something, with the number of triangles.
     crossing: BTreeMap<u32, u64>,
+    /// Loops that got a lid instead of a smooth patch.
+    flattened: u64,
 }
 
 impl Tried<'_> {
@@ -198,36 +198,48 @@ impl Tried<'_> {
         Ok(())
     }
 
-    /// Makes smooth patches that cross something again, as lids, and takes those that cross less.
-    fn flatten(
+    /// Makes patches that cross something again: smooth ones as lids, or lids with the least area. Those that cross
+    /// less are taken.
+    fn again(
         &mut self,
         near: &near::Near<'_>,
-        wish: &Wish<'_>,
+        (base, shape): (&Base, Shape),
         workspace: &Workspace,
     ) -> Result<()> {
-        let is_smooth = |number: &u32| self.closings[number].way == Way::Smooth;
-        let wrong: Vec<u32> = self.crossing.keys().copied().filter(is_smooth).collect();
+        let was = match shape {
+            Shape::Taut => Way::Lid,
+            _ => Way::Smooth,
+        };
+        let is_it = |number: &u32| self.closings[number].way == was;
+        let wrong: Vec<u32> = self.crossing.keys().copied().filter(is_it).collect();
         if wrong.is_empty() {
             return Ok(());
         }
-        let lids = Wish {
-            number: 1,
-            kind: Kind::Lids,
-            base: wish.base,
+        let wish = Wish {
+            number: self.tries.len() as u32,
+            shape,
+            base,
             only: Some(&wrong),
         };
-        let (patches, closings) = patches::close(near, &lids, workspace)?;
+        let (patches, closings) = patches::close(near, &wish, workspace)?;
+        let wrong: Vec<u32> = closings.iter().map(|closing| closing.0).collect();
         self.tries.push(patches);
         let tries: Vec<&Patches> = self.tries.iter().collect();
         let again = |number: u32| wrong.binary_search(&number).is_ok();
-        let chosen = |number: u32, n: usize| again(number) == (n == 1);
-        let found = crossings::find(self.source, 1, &tries, chosen, again, workspace)?;
+        let last = tries.len() - 1;
+        let chosen = |number: u32, n: usize| match again(number) {
+            true => n == last,
+            false => n == self.chosen.get(&number).copied().unwrap_or(0),
+        };
+        let step = wish.number;
+        let found = crossings::find(self.source, step, &tries, chosen, again, workspace)?;
         for (number, closing) in closings {
             let (was, is) = (self.crossing[&number], found.get(&number).copied());
             if is.unwrap_or(0) >= was {
                 continue;
             }
-            self.chosen.insert(number, 1);
+            self.flattened += u64::from(shape == Shape::Lid);
+            self.chosen.insert(number, last);
             self.closings.insert(number, closing);
             self.crossing.remove(&number);
             if let Some(is) = is {
@@ -239,7 +251,7 @@ impl Tried<'_> {
 
     fn stats(&self) -> ClosingStats {
         let mut stats = ClosingStats {
-            flattened: self.chosen.len() as u64,
+            flattened: self.flattened,
             crossing: self.crossing.len() as u64,
             crossed_triangles: self.crossing.values().sum(),
             ..ClosingStats::default()

@@ -25,7 +25,9 @@ pub(super) struct Placed {
     /// The loop, with positions from `origin`.
     pub around: Loop,
     pub ring: Ring,
-    /// A place near by, in the coordinates of the file.
+    /// Positions of the loop in the coordinates of the file: from a place near by, some are rounded.
+    pub exact: Vec<V3>,
+    /// A place near by, in these coordinates.
     pub origin: V3,
 }
 
@@ -80,7 +82,7 @@ pub(super) fn find<'a>(
     let touching = Touching::of(loops, source.vertices, &workspace.unit())?;
     let sent = Shuffle::<NearTriangle>::new("close.near");
     workspace.units(
-        ("close near", "close: surroundings"),
+        ("near", "close: surroundings"),
         source.ranges(),
         |_| SENT + READER,
         |unit| {
@@ -169,12 +171,6 @@ impl Near<'_> {
         }
         Ok(all)
     }
-
-    /// Deletes the surroundings.
-    pub fn release(self, workspace: &Workspace) -> Result<()> {
-        drop(self.inbox);
-        workspace.files.release("close.near")
-    }
 }
 
 fn empty(rows: &[LoopVertex]) -> Placed {
@@ -188,6 +184,7 @@ fn empty(rows: &[LoopVertex]) -> Placed {
             pinched: rows.iter().map(|row| row.pinched == 1).collect(),
             is_triangle: false,
         },
+        exact: vec![[0.0; 3]; n],
         ..Placed::default()
     }
 }
@@ -205,6 +202,7 @@ impl Placed {
         let corners = [0, 1, 2].map(|k| {
             if let Some(at) = at[k] {
                 self.around.points[at as usize] = points[k];
+                self.exact[at as usize] = triangle.positions[k];
                 return at;
             }
             *others.entry(triangle.corners[k]).or_insert_with(|| {

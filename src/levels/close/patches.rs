@@ -1,7 +1,8 @@
 //! Patches of all loops, batch by batch.
 
 use super::base::{Base, block};
-use super::lid::{Loop, Patch, lid, norm};
+use super::lid::{Loop, Patch, TAUT, lid, taut};
+use super::meet::norm;
 use super::membrane::{self, membrane};
 use super::near::{Near, Placed};
 use super::rows::{NewVertex, PatchTriangle, PlacedPatch};
@@ -42,11 +43,22 @@ pub(super) struct Patches {
     pub placed: Table<PlacedPatch>,
 }
 
+/// What the patches of a try are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Shape {
+    /// As is asked for.
+    Wanted(Kind),
+    /// Lids.
+    Lid,
+    /// Lids of least area; loops that are too long for them are not closed in this try.
+    Taut,
+}
+
 /// Which loops are closed, and how.
 pub(super) struct Wish<'a> {
     /// Number of the try.
     pub number: u32,
-    pub kind: Kind,
+    pub shape: Shape,
     pub base: &'a Base,
     /// The loops that are closed, ascending; all if it is none.
     pub only: Option<&'a [u32]>,
@@ -57,10 +69,10 @@ impl Wish<'_> {
         if self.base.loops.binary_search(&number).is_ok() {
             return (Way::Base, false);
         }
-        let smooth = match self.kind {
-            Kind::Lids => false,
-            Kind::Smooth => true,
-            Kind::Auto | Kind::Base(_) => around.runs_on() >= RUNS_ON,
+        let smooth = match self.shape {
+            Shape::Lid | Shape::Taut | Shape::Wanted(Kind::Lids) => false,
+            Shape::Wanted(Kind::Smooth) => true,
+            Shape::Wanted(Kind::Auto | Kind::Base(_)) => around.runs_on() >= RUNS_ON,
         };
         let is_too_long = smooth && around.len() > membrane::LONGEST;
         match smooth && !is_too_long {
@@ -77,12 +89,15 @@ impl Wish<'_> {
 }
 
 /// Bytes of memory for closing a loop of so many vertices: ears and their grid, or a refined patch.
-fn bytes(longest: u64, smooth: bool) -> u64 {
+fn bytes(longest: u64, shape: Shape) -> u64 {
+    let smooth = !matches!(shape, Shape::Lid | Shape::Taut | Shape::Wanted(Kind::Lids));
     let inside = match smooth && longest <= membrane::LONGEST as u64 {
         true => (longest * longest / 4).min(membrane::MOST as u64),
         false => 0,
     };
-    400 * longest + 900 * inside + (1 << 20)
+    // The table of the triangulation of least weight.
+    let table = longest.min(TAUT as u64).pow(2) * 64;
+    400 * longest + 900 * inside + table + (1 << 20)
 }
 
 /// Closes the loops.
@@ -104,9 +119,9 @@ pub(super) fn close(
     observer.begin("close loops", "edges", all);
     let mut closings = Vec::new();
     workspace.units(
-        (format!("close patches {number}"), "close: patches"),
+        (format!("patches {number}"), "close: patches"),
         batches,
-        |batch| near.bytes(batch) + bytes(near.batch(batch).longest, wish.kind != Kind::Lids),
+        |batch| near.bytes(batch) + bytes(near.batch(batch).longest, wish.shape),
         |unit| one(unit, near, wish, &patches),
         |_, found: Vec<(u32, Closing)>| {
             closings.extend(found);
@@ -158,6 +173,10 @@ impl Made {
         let (way, is_too_long) = wish.way(number, around);
         let (patch, overlaps) = match way {
             Way::Smooth => (membrane(around, &placed.ring), 0),
+            Way::Lid if wish.shape == Shape::Taut => match taut(around) {
+                Some(patch) => (patch, 0),
+                None => return,
+            },
             Way::Lid => (lid(around), 0),
             Way::Base => block(around, wish.base.z - placed.origin[2]),
         };
@@ -202,6 +221,10 @@ impl Made {
             let points: [V3; 3] = corners.map(point);
             let [a, b, c] = points;
             area += norm(cross(sub(b, a), sub(c, a))) / 2.0;
+            let positions = corners.map(|v| match v.checked_sub(n) {
+                None => placed.exact[v as usize],
+                Some(new) => add(patch.new[new as usize], placed.origin),
+            });
             let (mask, corners) = numbered(*corners);
             self.triangles.push(PatchTriangle {
                 number,
@@ -211,16 +234,9 @@ impl Made {
             self.placed.push(PlacedPatch {
                 number,
                 unused: 0,
-                positions: points.map(|p| add(p, placed.origin)),
+                positions,
             });
         }
         area
-    }
-}
-
-impl Patches {
-    /// Deletes the triangles with positions.
-    pub fn release_placed(&self, workspace: &Workspace) -> Result<()> {
-        self.placed.release(workspace)
     }
 }

@@ -1,7 +1,8 @@
 //! A lid refined to the spacing of its rim (Liepa 2003): triangles are split at their middles, and edges flipped until
 //! no pair of triangles has opposite angles of more than 180 degrees.
 
-use super::lid::{Loop, Patch, norm};
+use super::lid::{Loop, Patch};
+use super::meet::norm;
 use outcrop_geom::vector::{V3, add, cross, dot, scale, sub};
 use rustc_hash::FxHashSet;
 
@@ -14,9 +15,14 @@ const NONE: u32 = u32::MAX;
 
 /// A patch that is refined.
 pub(super) struct Net<'a> {
-    around: &'a Loop,
+    pub around: &'a Loop,
     /// Positions of the rim, then of the new vertices.
     pub points: Vec<V3>,
+    /// Where they lie on the lid.
+    flat: Vec<V3>,
+    /// True while triangles are split and edges flipped as they lie on the lid. On the patch alone that might never
+    /// end: fairing moves vertices along it.
+    pub on_lid: bool,
     /// The wanted spacing at each vertex.
     spacing: Vec<f64>,
     /// How the spacing grows from triangle to triangle: 1 for that of the rim everywhere.
@@ -41,7 +47,9 @@ impl<'a> Net<'a> {
         points.extend(lid.new);
         let mut net = Self {
             around,
+            flat: points.clone(),
             points,
+            on_lid: true,
             spacing,
             growth,
             parents: lid.parents,
@@ -78,7 +86,14 @@ impl<'a> Net<'a> {
     }
 
     fn corners(&self, t: [u32; 3]) -> [V3; 3] {
-        t.map(|v| self.points[v as usize])
+        t.map(|v| self.at(v))
+    }
+
+    fn at(&self, v: u32) -> V3 {
+        match self.on_lid {
+            true => self.flat[v as usize],
+            false => self.points[v as usize],
+        }
     }
 
     /// Splits every triangle that is too large; true if there was one.
@@ -90,7 +105,7 @@ impl<'a> Net<'a> {
             }
             let t = self.triangles[number];
             let corners = self.corners(t);
-            let middle = scale(add(add(corners[0], corners[1]), corners[2]), 1.0 / 3.0);
+            let middle = mean(corners);
             let spacings = t.map(|v| self.spacing[v as usize]);
             let spacing = self.growth * (spacings[0] + spacings[1] + spacings[2]) / 3.0;
             let is_large = corners.iter().zip(spacings).all(|(corner, own)| {
@@ -98,7 +113,7 @@ impl<'a> Net<'a> {
                 away > spacing && away > own
             });
             if is_large {
-                self.insert(number, middle, spacing);
+                self.insert(number, spacing);
                 any = true;
             }
         }
@@ -106,10 +121,12 @@ impl<'a> Net<'a> {
     }
 
     /// Divides a triangle by a new vertex.
-    fn insert(&mut self, number: usize, middle: V3, spacing: f64) {
+    fn insert(&mut self, number: usize, spacing: f64) {
         let new = self.points.len() as u32;
         let [a, b, c] = self.triangles[number];
-        self.points.push(middle);
+        let middle = |points: &[V3]| mean([a, b, c].map(|v| points[v as usize]));
+        self.points.push(middle(&self.points));
+        self.flat.push(middle(&self.flat));
         self.spacing.push(spacing);
         self.parents.push([a, b, c]);
         let (first, second, third) = (
@@ -177,7 +194,7 @@ impl<'a> Net<'a> {
         {
             return None;
         }
-        let [pa, pb, pc, pd] = [a, b, c, d].map(|v| self.points[v as usize]);
+        let [pa, pb, pc, pd] = [a, b, c, d].map(|v| self.at(v));
         if !flips(pa, pb, pc, pd) {
             return None;
         }
@@ -212,6 +229,10 @@ impl<'a> Net<'a> {
             triangles: self.triangles,
         }
     }
+}
+
+fn mean([a, b, c]: [V3; 3]) -> V3 {
+    scale(add(add(a, b), c), 1.0 / 3.0)
 }
 
 /// True if the angles at `a` and `d`, opposite of the edge from `b` to `c`, have more than 180 degrees together, and

@@ -39,7 +39,7 @@ pub(super) fn find(source: &Source, workspace: &Workspace) -> Result<Rim> {
     observer.begin("find edges", "triangles", source.triangles);
     let mut all = 0u64;
     workspace.units(
-        ("close edges", "close: edges"),
+        ("edges", "close: edges"),
         ranges,
         |_| RANGE * EACH + READER,
         |unit| {
@@ -78,7 +78,7 @@ pub(super) fn find(source: &Source, workspace: &Workspace) -> Result<Rim> {
         },
     )?;
     observer.end();
-    let rim = workspace.once("close rim", |unit| {
+    let rim = workspace.once("rim", |unit| {
         let wanted = (all + 1) * size_of::<NetEdge>() as u64;
         let buffer = wanted.clamp(1 << 20, (workspace.memory.available() / 4).max(1 << 20));
         let held = workspace.promise("close: edges", buffer)?;
