@@ -238,8 +238,9 @@ fn displacement_tells_how_far_each_point_moved() {
 fn confidence_is_the_share_of_cells_that_agree() {
     let bench = Bench::new();
     let mesh = bench.path("mesh.ply");
-    let run = |input: &Path| {
+    let run = |input: &Path, smooth| {
         let params = Params {
+            smooth,
             attributes: "confidence".parse().unwrap(),
             ..Params::default()
         };
@@ -251,7 +252,7 @@ fn confidence_is_the_share_of_cells_that_agree() {
         bench.cloud(&format!("{noise}.ply"), &cloud.noise(noise).seed(5))
     };
     let mean = |all: &[f32]| all.iter().map(|x| f64::from(*x)).sum::<f64>() / all.len() as f64;
-    let (report, clean) = run(&cloud(0.0));
+    let (report, clean) = run(&cloud(0.0), Smooth::Auto);
     let [least, most] = report.attributes[0].range;
     assert!(
         clean
@@ -260,7 +261,8 @@ fn confidence_is_the_share_of_cells_that_agree() {
     );
     assert!(least > 0.0 && most == 1.0);
     assert!(mean(&clean) > 0.97, "{}", mean(&clean));
-    let (_, noisy) = run(&cloud(5.0));
+    // As it was measured, without smoothing.
+    let (_, noisy) = run(&cloud(5.0), Smooth::Rounds(0));
     assert!(mean(&noisy) < mean(&clean) - 0.02, "{}", mean(&noisy));
 
     // A flat grid without one point has one narrow hole, whose rim is all that is less than sure inside.
@@ -268,7 +270,7 @@ fn confidence_is_the_share_of_cells_that_agree() {
         .map(|n| [n % 20, n / 20])
         .filter(|p| *p != [10, 10]);
     let points: Vec<_> = points.map(|[x, y]| [x, y, 0].map(f64::from)).collect();
-    let (report, flat) = run(&bench.points("grid.xyz", &points));
+    let (report, flat) = run(&bench.points("grid.xyz", &points), Smooth::Auto);
     assert_eq!(flat.len(), 399);
     assert_eq!(report.repair.holes_filled, 1);
     assert!(flat.iter().filter(|x| **x < 0.99).count() < 399 / 2);

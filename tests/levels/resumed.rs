@@ -254,7 +254,7 @@ fn a_cloud_becomes_a_small_mesh_at_once() {
     // Smaller and closed.
     let params = outcrop::Params {
         triangles: Some(1000),
-        close: Some(outcrop::Close::Lids),
+        close: Some("lids".parse().unwrap()),
         ..outcrop::Params::default()
     };
     let both = run("both.ply", None).params(params).build().unwrap();

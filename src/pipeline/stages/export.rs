@@ -4,7 +4,7 @@ use super::super::origin::Steps;
 use super::super::{beside, levels, made};
 use super::Stages;
 use crate::params::Origin;
-use outcrop_disk::error::{Result, Setting};
+use outcrop_disk::error::{Error, Result, Setting};
 use outcrop_geom::aabb::Aabb;
 use outcrop_geom::lattice::{Lattice, Shift};
 use outcrop_mesh::repair::Repaired;
@@ -129,9 +129,15 @@ impl Stages<'_> {
         let triangles = self.report.mesh.triangles;
         if let Some(wanted) = job.params.triangles {
             let how = (wanted, job.params.close);
-            let make = || made::simplify(&job.mesh, output, how, workspace);
+            let wrong =
+                |e: serde_json::Error| Error::io(&job.folder, "keep the report in", e.into());
+            // The journal has no structs within structs without names, so it is kept as JSON.
+            let make = || {
+                let made = made::simplify(&job.mesh, output, how, workspace)?;
+                serde_json::to_string(&made).map_err(wrong)
+            };
             let made = self.clock.stage("simplify", "triangles", triangles, make)?;
-            self.report.simplified = Some(made);
+            self.report.simplified = Some(serde_json::from_str(&made).map_err(wrong)?);
         } else if let Some(kind) = job.params.close {
             let make = || made::close(&job.mesh, output, kind, workspace);
             self.report.closed = Some(self.clock.stage("close", "triangles", triangles, make)?);
