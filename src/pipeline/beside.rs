@@ -6,7 +6,7 @@
 
 use crate::report::Report;
 use outcrop_disk::error::{Error, Result};
-use outcrop_mesh_files::export::{folder_of, is_compressed};
+use outcrop_mesh_files::export::{extensions, folder_of, is_compressed};
 use outcrop_points::Crs;
 use serde::Serialize;
 use std::ffi::OsString;
@@ -45,9 +45,6 @@ pub(super) fn path_beside(output: &Path, extension: &str) -> PathBuf {
     path.push(extension);
     path.into()
 }
-
-/// Extensions of meshes: those of one name share the files beside them.
-const MESHES: [&str; 4] = ["ply", "obj", "stl", "glb"];
 
 /// Writes the files beside the mesh. Those of an earlier mesh of the name that are not true any more are deleted;
 /// returns warnings about them.
@@ -109,9 +106,9 @@ fn without_prj(output: &Path, path: &Path, report: &Report) -> Result<Option<Str
     )))
 }
 
-/// Another mesh to which the files beside this one may belong.
+/// Another mesh to which the files beside this one may belong: meshes of one name share them.
 fn other_mesh(output: &Path) -> Option<PathBuf> {
-    let names = MESHES.into_iter().flat_map(|extension| {
+    let names = extensions().flat_map(|extension| {
         let plain = path_beside(output, extension);
         let mut packed = plain.clone().into_os_string();
         packed.push(".zst");

@@ -26,19 +26,33 @@ pub fn format_of(output: &Path) -> Result<&'static dyn MeshFormat> {
     named.ok_or_else(|| Error::Parameter {
         name: "output",
         found: output.display().to_string(),
-        expected: format!("a name that ends with {}", known_names()),
+        expected: format!(
+            "a name that ends with {} (compressed with .zst behind it, as in .ply.zst)",
+            in_words(extensions(), "or")
+        ),
     })
 }
 
-/// The extensions of all formats, in words.
-fn known_names() -> String {
-    let extensions = FORMATS.iter().flat_map(|format| format.extensions());
+/// The extensions of all formats.
+pub fn extensions() -> impl Iterator<Item = &'static str> {
+    extensions_of(|_| true)
+}
+
+/// The extensions of those formats.
+fn extensions_of(
+    which: impl Fn(&'static dyn MeshFormat) -> bool,
+) -> impl Iterator<Item = &'static str> {
+    let formats = FORMATS.into_iter().filter(move |format| which(*format));
+    formats.flat_map(|format| format.extensions()).copied()
+}
+
+/// Extensions in words, with `last` before the last one.
+fn in_words(extensions: impl Iterator<Item = &'static str>, last: &str) -> String {
     let names: Vec<String> = extensions.map(|e| format!(".{e}")).collect();
-    let (last, before) = names.split_last().unwrap_or((&names[0], &[]));
-    format!(
-        "{} or {last} (compressed with .zst behind it, as in .ply.zst)",
-        before.join(", ")
-    )
+    match names.split_last() {
+        Some((end, before)) if !before.is_empty() => format!("{} {last} {end}", before.join(", ")),
+        _ => names.concat(),
+    }
 }
 
 /// Checks that the extension of a mesh is known, and that the format has compression of its own if that is asked
@@ -107,9 +121,10 @@ pub fn left_out(
         let largest = (largest as f32).min(f32::MAX / 2.0);
         warnings.push(format!(
             "{} has 32-bit floats only: coordinates of this cloud are rounded to steps of up to {}; \
-             .ply, .obj and .glb keep them, or give {}",
+             {} keep them, or give {}",
             format.name(),
             largest.next_up() - largest,
+            in_words(extensions_of(MeshFormat::holds_doubles), "and"),
             observer.spell(&Setting::Value("origin", "auto".to_owned())),
         ));
     }

@@ -30,7 +30,7 @@ mod write;
 pub use file::{folder_of, is_compressed, temporary, temporary_of};
 pub use format::CoordinateType;
 pub use format::{Mesh, MeshFormat as Format, VertexColumn, normal_columns};
-pub use formats::{check_name, check_size, format_of, left_out, mesh_bytes};
+pub use formats::{check_name, check_size, extensions, format_of, left_out, mesh_bytes};
 pub use obj::decimals;
 pub use split::{SplitOptions, export_split};
 pub use split::{is_square_of, remove_unfinished};
