@@ -74,22 +74,41 @@ impl Volume {
 
     /// The volume; none if it is beyond all numbers.
     pub fn value(&self) -> Option<f64> {
-        let mut sum = 0.0;
-        let mut carry = 0i128;
-        let mut parts = Vec::with_capacity(BINS + 1);
-        // Each bin keeps its lowest digits, so that no two parts cancel.
-        for bin in &*self.bins {
-            let all = bin + carry;
-            carry = all >> DIGITS;
-            parts.push(all - (carry << DIGITS));
+        let (carry, parts) = self.parts(1);
+        // Below zero the highest digits would cancel.
+        let (carry, parts, sign) = match carry < 0 {
+            true => {
+                let (carry, parts) = self.parts(-1);
+                (carry, parts, -1.0)
+            }
+            false => (carry, parts, 1.0),
+        };
+        let part = |digits: i128, bin: usize| match digits {
+            0 => 0.0,
+            _ => {
+                let exponent = bin as i32 * DIGITS - 1074;
+                let half = exponent / 2;
+                digits as f64 * 2f64.powi(half) * 2f64.powi(exponent - half)
+            }
+        };
+        let mut sum = part(carry, BINS);
+        for (bin, digits) in parts.iter().enumerate().rev() {
+            sum += part(*digits, bin);
         }
-        let scale = |bin: usize| 2f64.powi(bin as i32 * DIGITS - 537) * 2f64.powi(-537);
-        sum += carry as f64 * scale(BINS - 1) * 2f64.powi(DIGITS);
-        for (bin, part) in parts.iter().enumerate().rev() {
-            sum += *part as f64 * scale(bin);
-        }
-        let volume = sum / 6.0;
+        let volume = sign * sum / 6.0;
         (volume.is_finite() && !self.is_lost).then_some(volume)
+    }
+
+    /// The sum times a sign: digits for each bin, none negative, and what is above all bins.
+    fn parts(&self, sign: i128) -> (i128, Vec<i128>) {
+        let mut carry = 0i128;
+        let parts = self.bins.iter().map(|bin| {
+            let all = sign * bin + carry;
+            carry = all >> DIGITS;
+            all - (carry << DIGITS)
+        });
+        let parts = parts.collect();
+        (carry, parts)
     }
 }
 
