@@ -242,6 +242,10 @@ fn confidence_is_the_share_of_cells_that_agree() {
         let params = Params {
             smooth,
             attributes: "confidence".parse().unwrap(),
+            relax: match smooth {
+                Smooth::Auto => Params::default().relax,
+                Smooth::Rounds(_) => 0,
+            },
             ..Params::default()
         };
         let report = util::reconstruct(input, &mesh, &params);
