@@ -79,7 +79,7 @@ impl Maker<'_> {
                 })
             })
             .collect();
-        json!({
+        let mut json = json!({
             "asset": { "version": "1.1" },
             "geometricError": diagonal.max(self.made[root].error),
             "root": tile,
@@ -99,7 +99,12 @@ impl Maker<'_> {
                 "columns": columns,
                 "source": about.source,
             } },
-        })
+        });
+        if let Some(lossy) = self.lossy() {
+            json["extras"]["outcrop"]["lossy"] =
+                json!({ "leaf_error": lossy.leaf_error, "collapsed": lossy.collapsed });
+        }
+        json
     }
 
     /// Writes the folder. It has its name when all is in it; a tileset that had the name is then deleted.
