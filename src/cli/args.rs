@@ -200,8 +200,7 @@ pub struct Tiles {
     /// Reference system of the mesh, if it names none or a wrong one, as for reconstruct
     #[arg(long, value_name = "EPSG:N|EPSG:N+M|FILE", value_parser = system)]
     pub crs: Option<GivenCrs>,
-    /// Round positions, normals, colours and other values: tiles take a third to a half of the bytes; the errors that
-    /// the tileset tells have it in them
+    /// Round positions, normals, colours and other values: tiles take about half of the bytes, and tell the error
     #[arg(long)]
     pub lossy: bool,
     /// Most triangles of a leaf

@@ -2,6 +2,7 @@
 
 use super::make::Maker;
 use super::node::Bounds;
+use super::report::Lossy;
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::Workspace;
 use serde_json::{Value, json};
@@ -56,6 +57,15 @@ impl Maker<'_> {
             tile["children"] = children.collect();
         }
         tile
+    }
+
+    /// What the leaves have lost, if the tileset is lossy.
+    pub fn lossy(&self) -> Option<Lossy> {
+        let leaves = &self.made[..self.cells.cells.len()];
+        self.lossy.then(|| Lossy {
+            leaf_error: leaves.iter().map(|leaf| leaf.error).fold(0.0, f64::max),
+            collapsed: leaves.iter().map(|leaf| leaf.collapsed).sum(),
+        })
     }
 
     fn json(&self, about: &About) -> Value {

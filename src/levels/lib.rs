@@ -15,6 +15,7 @@ mod geo;
 mod glb;
 mod intake;
 mod lattice;
+mod lengths;
 mod lossy;
 mod make;
 mod nearest;
@@ -29,6 +30,7 @@ mod simplify;
 pub mod single;
 mod system;
 mod tree;
+mod writer;
 
 pub use report::{Lossy, Options, TilesReport};
 pub use simplify::{Manner, Quadrics, Simplifier, Surface};
@@ -119,7 +121,7 @@ fn make(
     let passes = 2 + u64::from(options.lossy);
     observer.begin("share", "triangles", passes * intake.triangles);
     let rounding = match options.lossy {
-        true => rounding::of_cells(&intake, &cells, workspace)?,
+        true => lengths::rounding(&intake, &cells, workspace)?,
         false => Vec::new(),
     };
     let shared = Shared::find(&intake, &cells, &rounding, workspace)?;

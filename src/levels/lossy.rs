@@ -2,10 +2,8 @@
 //! few bits as that allows, and normals, colours and other values fewer bits.
 
 use super::columns::Columns;
-use super::glb::{Grids, Placed, Writer};
-use super::make::Maker;
 use super::node::{Node, squared};
-use super::report::Lossy;
+use super::writer::{Grids, Placed, Writer};
 use outcrop_codecs::glb::{FLOAT, SHORT};
 use outcrop_codecs::light;
 use outcrop_disk::error::Result;
@@ -13,25 +11,16 @@ use outcrop_ply::Scalar;
 use rustc_hash::FxHashSet;
 use serde_json::{Value, json};
 
-/// Bits of each of the two components of a normal.
+/// Bits of each of the two components of a normal: directions are within 4 degrees, 1.3 on average. Normals take 0.5 bytes a triangle
+/// on the lion, with 8 bits 0.8.
 pub(super) const NORMAL_BITS: u32 = 6;
 
-/// Largest step of other values, as a part of the range of the middle 96 % of a tile's values.
+/// Largest step of other values, as a part of the range of the middle 96 % of a tile's values: as many as a ramp of
+/// colours has, in a byte. Few values far from the others do not make it coarser.
 const VALUE_SHARE: f64 = 1.0 / 256.0;
 
 /// Bits of the whole number in the filter `EXPONENTIAL`.
 const BITS: u32 = 24;
-
-impl Maker<'_> {
-    /// What the leaves have lost, if the tileset is lossy.
-    pub fn lossy(&self) -> Option<Lossy> {
-        let leaves = &self.made[..self.cells.cells.len()];
-        self.lossy.then(|| Lossy {
-            leaf_error: leaves.iter().map(|leaf| leaf.error).fold(0.0, f64::max),
-            collapsed: leaves.iter().map(|leaf| leaf.collapsed).sum(),
-        })
-    }
-}
 
 /// Where the vertices of a tile at this depth are drawn.
 fn shown(node: &Node, depth: u32, grids: &Grids<'_>) -> Vec<[u32; 3]> {

@@ -2,7 +2,7 @@
 
 use super::cells::Cells;
 use super::distance::measure;
-use super::glb::{self, Grids};
+use super::glb;
 use super::intake::Intake;
 use super::lossy;
 use super::nearest;
@@ -11,6 +11,7 @@ use super::rows::LevelWord;
 use super::shared::{Shared, boundary, bytes};
 use super::simplify::{Manner, Simplifier, Surface, failed};
 use super::tree::TreeNode;
+use super::writer::Grids;
 use outcrop_disk::error::Result;
 use outcrop_disk::spill::Table;
 use outcrop_disk::workspace::{Unit, Workspace};
