@@ -236,6 +236,7 @@ def tiles(
     progress: Union[Progress, bool, None] = None,
     geo: bool = False,
     crs: Optional[Path] = None,
+    lossy: bool = False,
     memory: Optional[Size] = None,
     threads: Optional[int] = None,
     scratch: Optional[Path] = None,

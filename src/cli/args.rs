@@ -200,6 +200,9 @@ pub struct Tiles {
     /// Reference system of the mesh, if it names none or a wrong one, as for reconstruct
     #[arg(long, value_name = "EPSG:N|EPSG:N+M|FILE", value_parser = system)]
     pub crs: Option<GivenCrs>,
+    /// Round positions, normals, colours and other values: tiles take about half of the bytes, and tell the error
+    #[arg(long)]
+    pub lossy: bool,
     /// Most triangles of a leaf
     #[arg(long, hide = true, default_value = "65536", value_parser = clap::value_parser!(u32).range(1..))]
     pub most_triangles: u32,

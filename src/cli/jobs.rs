@@ -218,6 +218,7 @@ pub fn tiles(args: &TilesArgs, (observer, cancel): Watch) -> Result<TilesReport>
     let options = outcrop_levels::Options {
         geo: args.geo,
         crs: args.crs.clone(),
+        lossy: args.lossy,
         most_triangles: args.most_triangles,
     };
     let mut tiles = Tiles::new(&args.mesh, &args.output)

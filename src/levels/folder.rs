@@ -2,6 +2,7 @@
 
 use super::make::Maker;
 use super::node::Bounds;
+use super::report::Lossy;
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::Workspace;
 use serde_json::{Value, json};
@@ -58,6 +59,15 @@ impl Maker<'_> {
         tile
     }
 
+    /// What the leaves have lost, if the tileset is lossy.
+    pub fn lossy(&self) -> Option<Lossy> {
+        let leaves = &self.made[..self.cells.cells.len()];
+        self.lossy.then(|| Lossy {
+            leaf_error: leaves.iter().map(|leaf| leaf.error).fold(0.0, f64::max),
+            collapsed: leaves.iter().map(|leaf| leaf.collapsed).sum(),
+        })
+    }
+
     fn json(&self, about: &About) -> Value {
         let (intake, root) = (self.intake, self.nodes.len() - 1);
         let mut tile = self.tile(root);
@@ -79,7 +89,7 @@ impl Maker<'_> {
                 })
             })
             .collect();
-        json!({
+        let mut json = json!({
             "asset": { "version": "1.1" },
             "geometricError": diagonal.max(self.made[root].error),
             "root": tile,
@@ -99,7 +109,12 @@ impl Maker<'_> {
                 "columns": columns,
                 "source": about.source,
             } },
-        })
+        });
+        if let Some(lossy) = self.lossy() {
+            json["extras"]["outcrop"]["lossy"] =
+                json!({ "leaf_error": lossy.leaf_error, "collapsed": lossy.collapsed });
+        }
+        json
     }
 
     /// Writes the folder. It has its name when all is in it; a tileset that had the name is then deleted.

@@ -1,15 +1,15 @@
 //! A tile as a GLB file, its buffer views compressed with `EXT_meshopt_compression`.
 
 use super::columns::Columns;
-use super::lattice::Lattice;
+use super::lossy;
 use super::node::Node;
-use outcrop_codecs::glb::{COMPRESSION, FLOAT, INDEX, SHORT, View, header};
+use super::writer::{Grids, Placed, Writer};
+use outcrop_codecs::glb::{COMPRESSION, FLOAT, SHORT, header};
 use outcrop_codecs::light;
 use outcrop_codecs::meshopt;
-use outcrop_disk::error::{Error, Result};
+use outcrop_disk::error::Result;
 use outcrop_ply::Scalar;
 use serde_json::{Value, json};
-use std::path::Path;
 
 /// Component types of glTF.
 fn component(scalar: Scalar) -> u32 {
@@ -22,27 +22,6 @@ fn component(scalar: Scalar) -> u32 {
     }
 }
 
-/// The grids of a tileset.
-#[derive(Debug, Clone)]
-pub(super) struct Grids<'a> {
-    pub lattice: &'a Lattice,
-    /// By depth: the number of low bits of positions that tiles at this depth or below cannot show, because one of
-    /// them is too large; it never grows with depth.
-    pub low_bits: &'a [u32],
-}
-
-impl Grids<'_> {
-    /// The number of low bits that a vertex does not show in a tile at `depth`: as many as in the largest tile with
-    /// which it is shown beside this one, so that they agree.
-    fn hidden(&self, depth: u32, vertex_depth: u8) -> u32 {
-        let most = (self.low_bits.len() - 1) as u32;
-        let depth = depth
-            .min(u32::from(vertex_depth).saturating_add(1))
-            .min(most);
-        self.low_bits[depth as usize]
-    }
-}
-
 /// Low bits of positions that a tile hides whose longest side is twice `half`: the rest must fit 24 bits with a sign.
 pub(super) fn low_bits(half: u32) -> u32 {
     (0..32)
@@ -50,83 +29,12 @@ pub(super) fn low_bits(half: u32) -> u32 {
         .unwrap_or(31)
 }
 
-#[derive(Default)]
-struct Writer {
-    bytes: Vec<u8>,
-    views: Vec<Value>,
-    accessors: Vec<Value>,
-    /// Bytes of all views when they are decoded.
-    decoded: usize,
-}
-
-/// The data, if they could be encoded.
-fn encoded(data: std::io::Result<Vec<u8>>) -> Result<Vec<u8>> {
-    data.map_err(|e| Error::io(Path::new("tile"), "encode", e))
-}
-
-impl Writer {
-    /// Adds a buffer view of compressed data; returns its number.
-    fn view(&mut self, compressed: &[u8], view: &View<'_>) -> usize {
-        self.align();
-        self.decoded = self.decoded.next_multiple_of(4);
-        let element = view.json(self.bytes.len() as u64, self.decoded as u64);
-        self.views.push(element);
-        self.decoded += view.plain();
-        self.bytes.extend_from_slice(compressed);
-        self.views.len() - 1
-    }
-
-    fn align(&mut self) {
-        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
-    }
-
-    /// Adds vertex data of `stride` bytes each; returns the number of the accessor.
-    fn attribute(
-        &mut self,
-        data: &[u8],
-        stride: usize,
-        filter: Option<&str>,
-        mut accessor: Value,
-    ) -> Result<usize> {
-        let count = data.len() / stride;
-        let packed = encoded(meshopt::vertices(data, stride))?;
-        let view = View {
-            stride,
-            count,
-            mode: ("ATTRIBUTES", filter),
-            bytes: packed.len(),
-        };
-        let view = self.view(&packed, &view);
-        accessor["bufferView"] = view.into();
-        accessor["count"] = count.into();
-        self.accessors.push(accessor);
-        Ok(self.accessors.len() - 1)
-    }
-
-    /// Adds indices of corners or ends, encoded so.
-    fn indices(
-        &mut self,
-        (packed, mode): (std::io::Result<Vec<u8>>, &str),
-        count: usize,
-        vertices: usize,
-    ) -> Result<usize> {
-        let packed = encoded(packed)?;
-        let (stride, component) = match vertices < 1 << 16 {
-            true => (2, SHORT),
-            false => (4, INDEX),
-        };
-        let view = View {
-            stride,
-            count,
-            mode: (mode, None),
-            bytes: packed.len(),
-        };
-        let view = self.view(&packed, &view);
-        self.accessors.push(json!({
-            "bufferView": view, "componentType": component, "count": count, "type": "SCALAR",
-        }));
-        Ok(self.accessors.len() - 1)
-    }
+/// A tile as a file.
+pub(super) struct Written {
+    pub file: Vec<u8>,
+    /// The longest way of a vertex from its position to the place where it is drawn, in steps, if no attribute has
+    /// the rest.
+    pub moved: f64,
 }
 
 /// The place of a tile: a whole number of the steps of the coarsest grid.
@@ -135,29 +43,37 @@ fn place(node: &Node, grids: &Grids<'_>) -> [u32; 3] {
     node.bounds().middle().map(|x| x >> bits << bits)
 }
 
-/// A GLB file with a tile at this depth, and lines along `boundary`.
+/// A GLB file with a tile at this depth, which draws these of its triangles, and lines along `boundary`.
 pub(super) fn write(
-    node: &Node,
-    depth: u32,
+    (node, depth): (&Node, u32),
+    triangles: &[[u32; 3]],
     boundary: &[[u32; 2]],
     (grids, columns): (&Grids<'_>, &Columns),
-) -> Result<Vec<u8>> {
+) -> Result<Written> {
     let mut writer = Writer::default();
-    let place = place(node, grids);
-    let mut attributes = positions(&mut writer, node, depth, (grids, place))?;
-    let normals: Vec<u8> = node
-        .normals
-        .iter()
-        .flat_map(|[x, y]| [x.cast_unsigned(), y.cast_unsigned(), 127, 0])
-        .collect();
+    let placed = match grids.lossy {
+        true => lossy::positions(&mut writer, node, depth, grids)?,
+        false => positions(&mut writer, node, depth, grids)?,
+    };
+    let mut attributes = placed.attributes;
+    let normals: Vec<u8> = match grids.lossy {
+        true => lossy::normals(&node.normals),
+        false => {
+            let bytes = |n: &[i8; 2]| [n[0].cast_unsigned(), n[1].cast_unsigned(), 127, 0];
+            node.normals.iter().flat_map(bytes).collect()
+        }
+    };
     let accessor = json!({ "componentType": 5120, "normalized": true, "type": "VEC3" });
     attributes["NORMAL"] = writer
         .attribute(&normals, 4, Some("OCTAHEDRAL"), accessor)?
         .into();
-    values(&mut writer, node, columns, &mut attributes)?;
+    match grids.lossy {
+        true => lossy::values(&mut writer, node, columns, &mut attributes)?,
+        false => values(&mut writer, node, columns, &mut attributes)?,
+    }
     let vertices = node.ids.len();
-    let packed = (meshopt::triangles(&node.triangles), "TRIANGLES");
-    let indices = writer.indices(packed, 3 * node.triangles.len(), vertices)?;
+    let packed = (meshopt::triangles(triangles), "TRIANGLES");
+    let indices = writer.indices(packed, 3 * triangles.len(), vertices)?;
     let mut primitives = vec![json!({
         "attributes": attributes, "indices": indices, "mode": 4, "material": 0,
     })];
@@ -169,11 +85,12 @@ pub(super) fn write(
         }));
     }
     let step = grids.lattice.step;
-    let [x, y, z] = place.map(|x| f64::from(x) * step);
+    let [x, y, z] = placed.place.map(|x| f64::from(x) * step);
+    let unit = step * f64::from(1u32 << placed.bits);
     let matrix = [
-        [step, 0.0, 0.0, 0.0],
-        [0.0, 0.0, -step, 0.0],
-        [0.0, step, 0.0, 0.0],
+        [unit, 0.0, 0.0, 0.0],
+        [0.0, 0.0, -unit, 0.0],
+        [0.0, unit, 0.0, 0.0],
         [x, z, 0.0 - y, 1.0],
     ];
     writer.align();
@@ -198,16 +115,15 @@ pub(super) fn write(
     });
     let mut file = header(json.to_string().into_bytes(), writer.bytes.len() as u64);
     file.extend_from_slice(&writer.bytes);
-    Ok(file)
+    Ok(Written {
+        file,
+        moved: placed.moved,
+    })
 }
 
 /// Positions as whole steps from the place, in the filter `EXPONENTIAL`, and the bits that this leaves out.
-fn positions(
-    writer: &mut Writer,
-    node: &Node,
-    depth: u32,
-    (grids, place): (&Grids<'_>, [u32; 3]),
-) -> Result<Value> {
+fn positions(writer: &mut Writer, node: &Node, depth: u32, grids: &Grids<'_>) -> Result<Placed> {
+    let place = place(node, grids);
     let exponent = grids.hidden(depth, super::node::INNER);
     let mut data = Vec::with_capacity(12 * node.points.len());
     let mut low = Vec::with_capacity(8 * node.points.len());
@@ -236,7 +152,12 @@ fn positions(
         let accessor = json!({ "componentType": SHORT, "type": "VEC3" });
         attributes["_LOW"] = writer.attribute(&low, 8, None, accessor)?.into();
     }
-    Ok(attributes)
+    Ok(Placed {
+        attributes,
+        place,
+        bits: 0,
+        moved: 0.0,
+    })
 }
 
 /// Colours and other values.

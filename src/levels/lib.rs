@@ -15,20 +15,24 @@ mod geo;
 mod glb;
 mod intake;
 mod lattice;
+mod lengths;
+mod lossy;
 mod make;
 mod nearest;
 mod node;
 pub mod outlook;
 mod remaining;
 mod report;
+mod rounding;
 mod rows;
 mod shared;
 mod simplify;
 pub mod single;
 mod system;
 mod tree;
+mod writer;
 
-pub use report::{Options, TilesReport};
+pub use report::{Lossy, Options, TilesReport};
 pub use simplify::{Manner, Quadrics, Simplifier, Surface};
 
 use cells::Division;
@@ -114,8 +118,13 @@ fn make(
     intake.sent.release(workspace)?;
     workspace.trim();
     let observer = &workspace.observer;
-    observer.begin("share", "triangles", 2 * intake.triangles);
-    let shared = Shared::find(&intake, &cells, workspace)?;
+    let passes = 2 + u64::from(options.lossy);
+    observer.begin("share", "triangles", passes * intake.triangles);
+    let rounding = match options.lossy {
+        true => lengths::rounding(&intake, &cells, workspace)?,
+        false => Vec::new(),
+    };
+    let shared = Shared::find(&intake, &cells, &rounding, workspace)?;
     observer.end();
     let nodes = tree::build(&cells.cells);
     let (most, threads) = (options.most_triangles, workspace.threads);
@@ -128,6 +137,7 @@ fn make(
         nodes,
         bounds,
         low_bits,
+        lossy: options.lossy,
         most: options.most_triangles,
         simplifier: &Quadrics,
         files: Table::new("levels.tiles", 0),
@@ -156,6 +166,7 @@ fn make(
         root_error: root.error,
         step,
         exact: intake.lattice.exact,
+        lossy: maker.lossy(),
         crs: None,
     })
 }

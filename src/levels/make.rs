@@ -2,14 +2,16 @@
 
 use super::cells::Cells;
 use super::distance::measure;
-use super::glb::{self, Grids};
+use super::glb;
 use super::intake::Intake;
+use super::lossy;
 use super::nearest;
 use super::node::{Bounds, INNER, Node};
 use super::rows::LevelWord;
 use super::shared::{Shared, boundary, bytes};
 use super::simplify::{Manner, Simplifier, Surface, failed};
 use super::tree::TreeNode;
+use super::writer::Grids;
 use outcrop_disk::error::Result;
 use outcrop_disk::spill::Table;
 use outcrop_disk::workspace::{Unit, Workspace};
@@ -39,8 +41,14 @@ pub(super) struct Made {
     pub bytes: u32,
     /// Distance from the full mesh, measured at samples, with a margin; in its unit.
     pub error: f64,
+    /// The part of the error by which vertices here or below were moved by rounding.
+    #[serde(default)]
+    pub moved: f64,
     /// Edges of the boundary of the mesh.
     pub boundary: u64,
+    /// Triangles that rounding left out.
+    #[serde(default)]
+    pub collapsed: u64,
 }
 
 /// Inputs and state of the making of all tiles.
@@ -50,6 +58,8 @@ pub(super) struct Maker<'a> {
     pub nodes: Vec<TreeNode>,
     pub bounds: Vec<Bounds>,
     pub low_bits: Vec<u32>,
+    /// True if positions were rounded, and attributes may be.
+    pub lossy: bool,
     /// Most triangles of a cell.
     pub most: u32,
     pub simplifier: &'a dyn Simplifier,
@@ -91,6 +101,7 @@ impl Maker<'_> {
         Grids {
             lattice: &self.intake.lattice,
             low_bits: &self.low_bits,
+            lossy: self.lossy,
         }
     }
 
@@ -146,14 +157,10 @@ impl Maker<'_> {
         let stored = Self::stored(0);
         let work = |unit: &Unit<'_>| {
             let cell = unit.number();
-            let (node, _) = shared.node(unit, cell)?;
+            let node = shared.node(unit, cell)?;
             let node = node.with_triangles(&ordered(&node)?);
-            let depth = list[cell].depth;
-            let mut made = Made {
-                triangles: node.triangles.len() as u32,
-                ..Made::default()
-            };
-            this.write(unit, (cell, depth), &node, &mut made)?;
+            let mut made = this.write(unit, (cell, list[cell].depth), &node)?;
+            made.error = made.moved;
             stored.put(unit, cell, &node.to_words())?;
             unit.advance(node.triangles.len() as u64);
             Ok(made)
@@ -168,20 +175,28 @@ impl Maker<'_> {
         Ok(())
     }
 
-    /// Puts the GLB file of a tile.
-    fn write(
-        &self,
-        unit: &Unit<'_>,
-        (number, depth): (usize, u32),
-        node: &Node,
-        made: &mut Made,
-    ) -> Result<()> {
+    /// Puts the GLB file of a tile; its error is not known yet.
+    fn write(&self, unit: &Unit<'_>, (number, depth): (usize, u32), node: &Node) -> Result<Made> {
+        let grids = self.grids();
+        let arranged = self.lossy.then(|| lossy::arranged(node, depth, &grids));
+        let (node, drawn) = match &arranged {
+            Some((arranged, drawn)) => (arranged, *drawn),
+            None => (node, node.triangles.len()),
+        };
         let lines = boundary(node);
-        made.boundary = lines.len() as u64;
-        let file = glb::write(node, depth, &lines, (&self.grids(), &self.intake.columns))?;
-        made.bytes = file.len() as u32;
-        let words: Vec<LevelWord> = bytemuck::allocation::pod_collect_to_vec(&file);
-        self.files.put(unit, number, &words)
+        let triangles = &node.triangles[..drawn];
+        let about = (&grids, &self.intake.columns);
+        let written = glb::write((node, depth), triangles, &lines, about)?;
+        let words: Vec<LevelWord> = bytemuck::allocation::pod_collect_to_vec(&written.file);
+        self.files.put(unit, number, &words)?;
+        Ok(Made {
+            triangles: drawn as u32,
+            bytes: written.file.len() as u32,
+            error: 0.0,
+            moved: written.moved * self.intake.lattice.step,
+            boundary: lines.len() as u64,
+            collapsed: (node.triangles.len() - drawn) as u64,
+        })
     }
 
     /// Makes the tiles of a level; all below are made.
@@ -231,18 +246,16 @@ impl Maker<'_> {
         let count = joined.triangles.len();
         let mut target = target(count, self.most);
         let mut manner = Manner::Careful;
-        let errors = children.iter().map(|child| self.made[*child].error);
-        let below = errors.fold(0.0, f64::max);
+        let below = children.iter().map(|child| &self.made[*child]);
+        let (below, moved) = below.fold((0.0f64, 0.0f64), |(error, moved), child| {
+            (error.max(child.error - child.moved), moved.max(child.moved))
+        });
         let points = Points::of(&joined, *depth);
         loop {
             let triangles = points.simplify(&joined, target, manner, self.simplifier)?;
             let node = joined.with_triangles(&triangles);
             let node = node.with_triangles(&ordered(&node)?);
-            let mut made = Made {
-                triangles: node.triangles.len() as u32,
-                ..Made::default()
-            };
-            self.write(unit, (number, *depth), &node, &mut made)?;
+            let mut made = self.write(unit, (number, *depth), &node)?;
             if is_root && made.bytes as usize > ROOT_BYTES && !triangles.is_empty() {
                 target = target.min(triangles.len()) * 2 / 3;
                 manner = match manner {
@@ -252,16 +265,18 @@ impl Maker<'_> {
                 continue;
             }
             let own = points.distance(&joined, &triangles);
-            made.error = below + self.error(own);
+            made.moved = made.moved.max(moved);
+            made.error = below + self.error(own) + made.moved;
             Self::stored(*level).put(unit, number, &node.to_words())?;
             return Ok(made);
         }
     }
 
     /// The error of a tile besides that of its children, from the measured distance in steps; at least half a step,
-    /// so that leaves are always better.
+    /// so that leaves are always better. Writing a lossy tile tells the error of hidden bits itself.
     fn error(&self, distance: f64) -> f64 {
         let hidden = match self.low_bits.first() {
+            _ if self.lossy => 0.0,
             None | Some(0) => 0.0,
             Some(bits) => 3f64.sqrt() * f64::from(1u32 << bits),
         };
@@ -298,6 +313,7 @@ fn join(nodes: Vec<Node>) -> Node {
                 all.ids.push(id);
                 all.points.push(node.points[vertex]);
                 all.depths.push(depth);
+                all.rounding.push(node.rounding[vertex]);
                 all.normals.push(node.normals[vertex]);
                 let values = &node.values[vertex * each..][..each];
                 all.values.extend_from_slice(values);

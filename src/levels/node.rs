@@ -1,5 +1,6 @@
 //! A tile in memory, and as words in a scratch file.
 
+use super::rounding::rounded;
 use super::rows::LevelWord;
 
 /// The depth of a vertex that only one cell has.
@@ -15,6 +16,8 @@ pub(super) struct Node {
     /// Depth of the smallest cell of the octree that has all triangles of the full mesh around the vertex;
     /// [`INNER`] if it is a leaf of the tree.
     pub depths: Vec<u8>,
+    /// The low bits of each position that tiles do not show.
+    pub rounding: Vec<u8>,
     /// Normals, octahedral.
     pub normals: Vec<[i8; 2]>,
     /// The other values, of all vertices one after the other.
@@ -46,9 +49,9 @@ impl Node {
         words.push(self.value_words() as u32);
         words.extend_from_slice(&self.ids);
         words.extend_from_slice(self.points.as_flattened());
-        let packed = self.depths.iter().zip(&self.normals);
-        words.extend(packed.map(|(depth, [x, y])| {
-            u32::from_le_bytes([*depth, x.cast_unsigned(), y.cast_unsigned(), 0])
+        let packed = self.depths.iter().zip(&self.normals).zip(&self.rounding);
+        words.extend(packed.map(|((depth, [x, y]), bits)| {
+            u32::from_le_bytes([*depth, x.cast_unsigned(), y.cast_unsigned(), *bits])
         }));
         words.extend_from_slice(&self.values);
         words.extend_from_slice(self.triangles.as_flattened());
@@ -77,6 +80,7 @@ impl Node {
             ids,
             points,
             depths: packed.iter().map(|word| word[0]).collect(),
+            rounding: packed.iter().map(|word| word[3]).collect(),
             normals: packed.iter().map(normal).collect(),
             values: take(vertices * *values as usize).to_vec(),
             triangles: take(3 * *triangles as usize).as_chunks().0.to_vec(),
@@ -100,6 +104,7 @@ impl Node {
                     made.ids.push(self.ids[old]);
                     made.points.push(self.points[old]);
                     made.depths.push(self.depths[old]);
+                    made.rounding.push(self.rounding[old]);
                     made.normals.push(self.normals[old]);
                     let values = &self.values[old * each..][..each];
                     made.values.extend_from_slice(values);
@@ -118,6 +123,18 @@ impl Node {
     pub fn bounds(&self) -> Bounds {
         self.points.iter().fold(Bounds::EMPTY, |b, p| b.with(*p))
     }
+
+    /// The positions, rounded as far as each is.
+    pub fn rounded(&self) -> impl Iterator<Item = [u32; 3]> {
+        let all = self.points.iter().zip(&self.rounding);
+        all.map(|(point, bits)| rounded(*point, *bits))
+    }
+}
+
+/// Squared distance of two positions.
+pub(super) fn squared(p: [u32; 3], q: [u32; 3]) -> f64 {
+    let sides = (0..3).map(|axis| f64::from(p[axis].abs_diff(q[axis])));
+    sides.map(|side| side * side).sum()
 }
 
 /// The least and largest position on the lattice.
@@ -207,6 +224,7 @@ mod tests {
             ids: vec![7, 9, 4, 8],
             points: vec![[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 5]],
             depths: vec![INNER, 0, 3, INNER],
+            rounding: vec![0, 7, 28, 1],
             normals: vec![[1, -1], [0, 127], [-127, 3], [5, 6]],
             values: vec![1, 2, 3, 4, 5, 6, 7, 8],
             triangles: vec![[0, 1, 2], [2, 1, 3]],

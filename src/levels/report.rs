@@ -13,6 +13,8 @@ pub struct Options {
     pub geo: bool,
     /// The reference system of the mesh, instead of what it says of it.
     pub crs: Option<GivenCrs>,
+    /// Round positions, normals, colours and other values, so that tiles are smaller.
+    pub lossy: bool,
     /// Most triangles of a leaf, unless it cannot be divided: for tests.
     #[doc(hidden)]
     pub most_triangles: u32,
@@ -23,9 +25,19 @@ impl Default for Options {
         Self {
             geo: false,
             crs: None,
+            lossy: false,
             most_triangles: MOST,
         }
     }
+}
+
+/// What a lossy tileset has lost at its leaves.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Lossy {
+    /// Largest distance of the leaves from the mesh, at most, in the mesh's unit.
+    pub leaf_error: f64,
+    /// Triangles of the mesh that rounding left without an area, and that no leaf has.
+    pub collapsed: u64,
 }
 
 /// Counts and sizes of a tileset.
@@ -33,7 +45,7 @@ impl Default for Options {
 pub struct TilesReport {
     /// Vertices of the mesh.
     pub vertices: u64,
-    /// Triangles of the mesh: those of the leaves.
+    /// Triangles of the mesh: those of the leaves, unless rounding left some out.
     pub triangles: u64,
     /// Edges of the mesh with one triangle.
     pub boundary_edges: u64,
@@ -55,6 +67,9 @@ pub struct TilesReport {
     pub step: f64,
     /// True if all coordinates are multiples of the step.
     pub exact: bool,
+    /// What was lost, if the tileset is lossy.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lossy: Option<Lossy>,
     /// The reference system of the mesh.
     pub crs: Option<Crs>,
 }
@@ -72,9 +87,15 @@ impl TilesReport {
         let megabytes = |bytes: u64| bytes as f64 / 1e6;
         let system = self.crs.as_ref().map(|crs| crs.described(spell));
         let system = system.map_or_else(String::new, |system| format!("system: {system}\n"));
+        let lossy = self.lossy.map_or_else(String::new, |lossy| {
+            format!(
+                "rounded: all triangles within {:.6} of the mesh, {} without area left out\n",
+                lossy.leaf_error, lossy.collapsed
+            )
+        });
         format!(
             "{} triangles in {} tiles of {} levels, {:.1} MB\n\
-             {system}\
+             {system}{lossy}\
              coarsest tile: {} triangles, {:.2} MB, at most {:.6} from the mesh",
             self.triangles,
             self.tiles,

@@ -62,7 +62,8 @@ row! {
         cell: u32,
         /// The vertex.
         vertex: u32,
-        /// Depth of the smallest node that has all of these cells.
+        /// Depth of the smallest node that has all of these cells; in the second byte the low bits of the position
+        /// that are rounded away.
         depth: u32,
     }
     packed Above Above Above

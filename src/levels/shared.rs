@@ -5,6 +5,7 @@ use super::cells::Cells;
 use super::columns::octahedral;
 use super::intake::{BLOCK, Intake, Stored};
 use super::node::{Bounds, INNER, Node, open_edges};
+use super::rounding::common;
 use super::rows::{
     CellEdge, CellTriangle, CellVertex, PartNormal, SeamEdge, SharedVertex, WholeNormal,
 };
@@ -23,6 +24,8 @@ const SHARE_EACH: u64 = 96;
 pub(super) struct Shared<'a> {
     intake: &'a Intake,
     cells: &'a Cells,
+    /// The low bits of positions that each cell rounds away; none without any.
+    rounding: &'a [u8],
     vertices: Inbox<SharedVertex>,
     /// The seams and the normals, once they are known.
     known: Option<(Inbox<SeamEdge>, Inbox<WholeNormal>)>,
@@ -188,7 +191,8 @@ fn share_edges(shared: &Shared<'_>, workspace: &Workspace) -> Result<Vec<Bounds>
         });
         unit.advance(node.triangles.len() as u64);
         edges.send(unit, unit.number(), rows.collect())?;
-        Ok(node.bounds())
+        // As they are drawn.
+        Ok(node.rounded().fold(Bounds::EMPTY, Bounds::with))
     };
     let bytes_of = |n: usize| bytes(intake, list[n].triangles);
     let mut bounds = vec![Bounds::EMPTY; list.len()];
@@ -253,18 +257,28 @@ fn share_edges(shared: &Shared<'_>, workspace: &Workspace) -> Result<Vec<Bounds>
 }
 
 impl<'a> Shared<'a> {
-    /// Finds what the cells have in common.
-    pub fn find(intake: &'a Intake, cells: &'a Cells, workspace: &Workspace) -> Result<Self> {
+    /// Finds what the cells have in common. They round away so many low bits of positions, if there are any.
+    pub fn find(
+        intake: &'a Intake,
+        cells: &'a Cells,
+        rounding: &'a [u8],
+        workspace: &Workspace,
+    ) -> Result<Self> {
         let depth = |same: &[CellVertex]| {
             let ends = [same[0], same[same.len() - 1]];
             let [a, b] = ends.map(|row| &cells.cells[row.cell as usize]);
-            common_depth(a, b)
+            let bits = match rounding.is_empty() {
+                true => 0,
+                false => common(same.iter().map(|row| rounding[row.cell as usize])),
+            };
+            common_depth(a, b) | u32::from(bits) << 8
         };
         share_vertices(intake, cells, ([VERTICES, SHARED], ""), depth, workspace)?;
         let count = cells.cells.len();
         let mut shared = Self {
             intake,
             cells,
+            rounding,
             vertices: Shuffle::new(SHARED).open(workspace, count)?,
             known: None,
             bounds: Vec::new(),
@@ -299,9 +313,12 @@ impl<'a> Shared<'a> {
         })?;
         node.ids = ids;
         let mut at = 0;
+        let own = self.rounding.get(cell).copied().unwrap_or(0);
+        node.rounding = vec![own; node.ids.len()];
         for row in self.vertices.get(unit, cell)? {
             at += node.ids[at..].partition_point(|id| *id < row.vertex);
             node.depths[at] = row.depth as u8;
+            node.rounding[at] = (row.depth >> 8) as u8;
         }
         let sums = match columns.has_normals() {
             true => Vec::new(),
@@ -310,14 +327,14 @@ impl<'a> Shared<'a> {
         Ok((node, sums))
     }
 
-    /// The node of a cell, and the number of boundary edges of the mesh in it.
-    pub fn node(&self, unit: &Unit<'_>, cell: usize) -> Result<(Node, u64)> {
+    /// The node of a cell.
+    pub fn node(&self, unit: &Unit<'_>, cell: usize) -> Result<Node> {
         let (mut node, sums) = self.vertices_of(unit, cell)?;
         for (normal, sum) in node.normals.iter_mut().zip(&sums) {
             *normal = octahedral(sum.map(f64::from));
         }
         let Some((edges, normals)) = &self.known else {
-            return Ok((node, 0));
+            return Ok(node);
         };
         let mut at = 0;
         for row in normals.get(unit, cell)? {
@@ -327,8 +344,7 @@ impl<'a> Shared<'a> {
         let index = |id: u32| node.ids.partition_point(|other| *other < id) as u32;
         let seams = edges.get(unit, cell)?;
         node.seams = seams.iter().map(|row| row.ends.map(index)).collect();
-        let boundary = boundary(&node).len() as u64;
-        Ok((node, boundary))
+        Ok(node)
     }
 
     /// Deletes the files.

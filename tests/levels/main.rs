@@ -3,6 +3,7 @@
 mod checks;
 mod closed;
 mod globe;
+mod lossy;
 mod meshes;
 mod resumed;
 mod single;

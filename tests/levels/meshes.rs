@@ -163,6 +163,12 @@ fn dot(a: V, b: V) -> f64 {
 
 /// Squared distance of `p` from a triangle, region by region (Ericson, Real-Time Collision Detection, 5.1.5).
 fn distance2(p: V, [a, b, c]: [V; 3]) -> f64 {
+    // Two corners at one place may only be the last two.
+    let [a, b, c] = match (a == b, a == c) {
+        (true, _) => [a, c, c],
+        (false, true) => [a, b, b],
+        _ => [a, b, c],
+    };
     let at = |v: f64, w: f64| {
         let q: V = std::array::from_fn(|k| a[k] + v * (b[k] - a[k]) + w * (c[k] - a[k]));
         dot(minus(p, q), minus(p, q))

@@ -26,6 +26,8 @@ pub struct Tile {
     pub lines: Vec<[u32; 2]>,
     /// Centre and half sides of the box.
     pub volume: [f64; 6],
+    /// True if positions have 16 bits.
+    pub is_short: bool,
 }
 
 /// A tileset; the first tile is the root.
@@ -121,7 +123,10 @@ fn glb(file: &[u8], step: f64) -> Tile {
     let json: Value = serde_json::from_slice(&file[20..20 + word(12)]).unwrap();
     let binary = &file[28 + word(12)..];
     let matrix: Vec<f64> = serde_json::from_value(json["nodes"][0]["matrix"].clone()).unwrap();
-    assert_eq!((matrix[0], matrix[6], matrix[9]), (step, -step, step));
+    // Of a lossy tileset, a power of two times the step.
+    let unit = (matrix[0] / step).round() as i64;
+    assert!(unit.count_ones() == 1 && matrix[0] == step * unit as f64);
+    assert_eq!((matrix[6], matrix[9]), (-matrix[0], matrix[0]));
     // Zeros elsewhere.
     for at in [1, 2, 3, 4, 5, 7, 8, 10, 11] {
         assert_eq!(matrix[at], 0.0);
@@ -132,14 +137,21 @@ fn glb(file: &[u8], step: f64) -> Tile {
     let (positions, _) = data(&json, binary, &attributes["POSITION"]);
     let accessor = &json["accessors"][attributes["POSITION"].as_u64().unwrap() as usize];
     let mut drawn = Vec::new();
-    for position in positions.chunks_exact(12) {
+    let is_short = accessor["componentType"] == 5123;
+    for position in positions.chunks_exact(if is_short { 8 } else { 12 }) {
         drawn.push(std::array::from_fn(|axis| {
-            let x = f32::from_le_bytes(position[4 * axis..][..4].try_into().unwrap());
+            let x = match is_short {
+                true => f32::from(u16::from_le_bytes([
+                    position[2 * axis],
+                    position[2 * axis + 1],
+                ])),
+                false => f32::from_le_bytes(position[4 * axis..][..4].try_into().unwrap()),
+            };
             assert_eq!(x.fract(), 0.0);
             let x = f64::from(x);
             let (min, max) = (&accessor["min"][axis], &accessor["max"][axis]);
             assert!(min.as_f64().unwrap() <= x && x <= max.as_f64().unwrap());
-            x as i64 + place[axis]
+            x as i64 * unit + place[axis]
         }));
     }
     let mut exact = drawn.clone();
@@ -179,5 +191,6 @@ fn glb(file: &[u8], step: f64) -> Tile {
             .to_vec(),
         lines: lines.as_chunks().0.to_vec(),
         volume: [0.0; 6],
+        is_short,
     }
 }
