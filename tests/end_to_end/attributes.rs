@@ -267,17 +267,9 @@ fn confidence_is_the_share_of_cells_that_agree() {
     assert!(mean(&clean) > 0.97, "{}", mean(&clean));
     // As it was measured, without smoothing.
     let (_, noisy) = run(&cloud(5.0), Smooth::Rounds(0));
-    assert!(mean(&noisy) < mean(&clean) - 0.02, "{}", mean(&noisy));
-
-    // A flat grid without one point has one narrow hole, whose rim is all that is less than sure inside.
-    let points = (0..400)
-        .map(|n| [n % 20, n / 20])
-        .filter(|p| *p != [10, 10]);
-    let points: Vec<_> = points.map(|[x, y]| [x, y, 0].map(f64::from)).collect();
-    let (report, flat) = run(&bench.points("grid.xyz", &points), Smooth::Auto);
-    assert_eq!(flat.len(), 399);
-    assert_eq!(report.repair.holes_filled, 1);
-    assert!(flat.iter().filter(|x| **x < 0.99).count() < 399 / 2);
+    assert!(mean(&noisy) < mean(&clean) - 0.2, "{}", mean(&noisy));
+    // Around most of these vertices holes were filled.
+    assert!(noisy.iter().any(|x| *x < 0.2));
 }
 
 #[test]
