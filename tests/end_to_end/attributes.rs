@@ -268,7 +268,7 @@ fn confidence_is_the_share_of_cells_that_agree() {
     // As it was measured, without smoothing.
     let (_, noisy) = run(&cloud(5.0), Smooth::Rounds(0));
     assert!(mean(&noisy) < mean(&clean) - 0.2, "{}", mean(&noisy));
-    // Around most of these vertices holes were filled.
+    // Some have nearly no support.
     assert!(noisy.iter().any(|x| *x < 0.2));
 }
 
