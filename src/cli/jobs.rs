@@ -151,6 +151,24 @@ pub fn compare(args: &Compare, watch: Watch) -> Result<compare::Comparison> {
     pages::compare(page, [a, b], &options, &workspace)
 }
 
+/// Runs a job on a mesh within the limits of the command line.
+#[cfg(feature = "levels")]
+macro_rules! run_within {
+    ($job:ident, $args:ident, $observer:ident, $cancel:ident) => {{
+        let job = $job
+            .memory(memory(&$args.limits))
+            .threads(threads(&$args.limits))
+            .storage($args.limits.storing.storage())
+            .start($args.again.start())
+            .observer($observer)
+            .cancel($cancel);
+        match &$args.limits.scratch {
+            Some(scratch) => job.scratch(scratch).run(),
+            None => job.run(),
+        }
+    }};
+}
+
 /// Makes a mesh with fewer triangles.
 #[cfg(feature = "levels")]
 pub fn simplify(args: &Simplify, (observer, cancel): Watch) -> Result<SimplifyReport> {
@@ -167,20 +185,11 @@ pub fn simplify(args: &Simplify, (observer, cancel): Watch) -> Result<SimplifyRe
         keep_boundary: args.keep_boundary,
         most_triangles: args.most_triangles,
     };
-    let mut job = Simplification::new(&args.mesh, &args.output, goal)
+    let job = Simplification::new(&args.mesh, &args.output, goal)
         .options(options)
         .samples(args.samples)
-        .close(args.close)
-        .memory(memory(&args.limits))
-        .threads(threads(&args.limits))
-        .storage(args.limits.storing.storage())
-        .start(args.again.start())
-        .observer(observer)
-        .cancel(cancel);
-    if let Some(scratch) = &args.limits.scratch {
-        job = job.scratch(scratch);
-    }
-    job.run()
+        .close(args.close);
+    run_within!(job, args, observer, cancel)
 }
 
 /// The answer of a build without levels of detail.
@@ -192,18 +201,8 @@ pub fn simplify(_: &Simplify, _: Watch) -> Result<SimplifyReport> {
 /// Closes a mesh.
 #[cfg(feature = "levels")]
 pub fn close(args: &Close, (observer, cancel): Watch) -> Result<CloseReport> {
-    let mut job = Closing::new(&args.mesh, &args.output)
-        .kind(args.kind)
-        .memory(memory(&args.limits))
-        .threads(threads(&args.limits))
-        .storage(args.limits.storing.storage())
-        .start(args.again.start())
-        .observer(observer)
-        .cancel(cancel);
-    if let Some(scratch) = &args.limits.scratch {
-        job = job.scratch(scratch);
-    }
-    job.run()
+    let job = Closing::new(&args.mesh, &args.output).kind(args.kind);
+    run_within!(job, args, observer, cancel)
 }
 
 /// The answer of a build without levels of detail.
@@ -221,18 +220,8 @@ pub fn tiles(args: &TilesArgs, (observer, cancel): Watch) -> Result<TilesReport>
         lossy: args.lossy,
         most_triangles: args.most_triangles,
     };
-    let mut tiles = Tiles::new(&args.mesh, &args.output)
-        .options(options)
-        .memory(memory(&args.limits))
-        .threads(threads(&args.limits))
-        .storage(args.limits.storing.storage())
-        .start(args.again.start())
-        .observer(observer)
-        .cancel(cancel);
-    if let Some(scratch) = &args.limits.scratch {
-        tiles = tiles.scratch(scratch);
-    }
-    tiles.run()
+    let tiles = Tiles::new(&args.mesh, &args.output).options(options);
+    run_within!(tiles, args, observer, cancel)
 }
 
 #[cfg(not(feature = "levels"))]

@@ -59,7 +59,7 @@ impl Maker<'_> {
         tile
     }
 
-    /// What the leaves have lost, if the tileset is lossy.
+    /// The losses in the leaves, if the tileset is lossy.
     pub fn lossy(&self) -> Option<Lossy> {
         let leaves = &self.made[..self.cells.cells.len()];
         self.lossy.then(|| Lossy {

@@ -1,4 +1,4 @@
-//! What a tile has less in a lossy tileset. Positions were rounded before all tiles (`rounding`); here they take as
+//! The encoding of the tiles of a lossy tileset. Positions were rounded before all tiles (`rounding`); here they take as
 //! few bits as that allows, and normals, colours and other values fewer bits.
 
 use super::columns::Columns;

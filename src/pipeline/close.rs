@@ -165,12 +165,7 @@ fn written(
         )),
         false => {}
     }
-    let all = about.bounds.unwrap_or_default();
-    let largest = all.as_flattened().iter();
-    let largest = largest.fold(0.0, |most: f64, x| most.max(x.abs()));
-    for warning in export::left_out(output, &about, largest, &**observer)? {
-        observer.warn(&warning);
-    }
+    like.warn_of_left_out(&about, workspace)?;
     write(output, (about, shift), workspace, |writer| {
         Appending::of(closure, &source, writer, workspace)?.read(mesh, workspace)
     })

@@ -66,4 +66,16 @@ impl Like<'_> {
         };
         Ok((about, shift))
     }
+
+    /// Says what of the mesh the format of the output does not hold.
+    pub fn warn_of_left_out(&self, about: &Mesh, workspace: &Workspace) -> Result<()> {
+        let all = about.bounds.unwrap_or_default();
+        let largest = all.as_flattened().iter();
+        let largest = largest.fold(0.0, |most: f64, x| most.max(x.abs()));
+        let observer = &workspace.observer;
+        for warning in export::left_out(self.output, about, largest, &**observer)? {
+            observer.warn(&warning);
+        }
+        Ok(())
+    }
 }

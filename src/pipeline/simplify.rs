@@ -15,7 +15,6 @@ use outcrop_disk::workspace::progress::{Cancel, Observer};
 use outcrop_disk::workspace::{Storage, Workspace};
 use outcrop_inspect::compare;
 use outcrop_levels::single::{self, Goal, Options, Simplified};
-use outcrop_mesh_files::export;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -177,13 +176,7 @@ impl Simplification {
         };
         let counts = [made.vertices(), made.triangles()];
         let (about, shift) = like.about(counts, bounds.corners(), workspace)?;
-        let all = about.bounds.unwrap_or_default();
-        let largest = all.as_flattened().iter();
-        let largest = largest.fold(0.0, |most: f64, x| most.max(x.abs()));
-        let observer = &workspace.observer;
-        for warning in export::left_out(output, &about, largest, &**observer)? {
-            observer.warn(&warning);
-        }
+        like.warn_of_left_out(&about, workspace)?;
         write(output, (about, shift), workspace, |writer| {
             made.read(writer, workspace)
         })

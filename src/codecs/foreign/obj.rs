@@ -185,10 +185,7 @@ impl Parser<'_, '_> {
         if count < 3 || ![x, y, z].iter().all(|x| x.is_finite()) {
             return Err(Failed::Expected("v and three finite numbers"));
         }
-        let colour = (count >= 6).then(|| {
-            let byte = |part: f64| (part.clamp(0.0, 1.0) * 255.0).round() as u8;
-            [rest[0], rest[1], rest[2]].map(byte)
-        });
+        let colour = (count >= 6).then(|| [rest[0], rest[1], rest[2]].map(byte));
         Ok(self.spool.vertex([x, y, z], colour)?)
     }
 
@@ -252,7 +249,6 @@ impl Parser<'_, '_> {
                         .split_ascii_whitespace()
                         .map_while(|x| x.parse().ok())
                         .collect();
-                    let byte = |part: f64| (part.clamp(0.0, 1.0) * 255.0).round() as u8;
                     if let (Some(material), [r, g, b]) = (material, &parts[..]) {
                         self.spool.palette[usize::from(material)] = Some([*r, *g, *b].map(byte));
                     }
@@ -262,6 +258,11 @@ impl Parser<'_, '_> {
             }
         }
     }
+}
+
+/// A part of a colour, from 0 to 1, in 8 bits.
+fn byte(part: f64) -> u8 {
+    (part.clamp(0.0, 1.0) * 255.0).round() as u8
 }
 
 fn read_library(path: &Path) -> std::io::Result<String> {

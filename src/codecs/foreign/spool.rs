@@ -127,7 +127,7 @@ pub(super) struct Spool<'a> {
     polygons: u64,
     /// Faces with less than three corners.
     lines: u64,
-    /// What the mesh has beside its triangles and is not read.
+    /// The kinds of data in the file that are not read, such as textures.
     pub left_out: Vec<&'static str>,
     _held: Reservation,
 }

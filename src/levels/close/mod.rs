@@ -69,7 +69,7 @@ pub struct Closed {
     pub area: f64,
 }
 
-/// What was done to close a mesh.
+/// Counts of the loops that were closed, by the way in which they were.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct ClosingStats {
     /// Loops closed smoothly.
@@ -118,7 +118,7 @@ impl ClosingStats {
 /// The triangles that close a mesh; they lie in the scratch folder.
 #[derive(Debug)]
 pub struct Closure {
-    /// What was done.
+    /// Counts of its loops and triangles.
     pub stats: ClosingStats,
     /// Vertices and triangles of the mesh.
     pub before: [u64; 2],
@@ -274,7 +274,7 @@ impl Tried<'_> {
     }
 }
 
-/// What closes a batch of loops, with the numbers of vertices in the closed mesh.
+/// The vertices and triangles that close a batch of loops. Numbers of vertices are those of the closed mesh.
 #[derive(Debug, Default)]
 pub struct Part {
     /// Positions of new vertices.

@@ -1,4 +1,4 @@
-//! What lies around the loops: for each batch the triangles of the mesh that touch one of its loops.
+//! The surroundings of the loops: for each batch, the triangles of the mesh that touch one of its loops.
 
 use super::fair::Ring;
 use super::lid::Loop;

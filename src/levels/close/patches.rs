@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 /// the mean: there the surface runs on into the hole. The border of a half sphere has 90 degrees, and an outline 180.
 const RUNS_ON: f64 = 0.5;
 
-/// What closes a loop.
+/// The way in which a loop was closed, and counts of its new triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) struct Closing {
     /// How it is closed.
@@ -43,7 +43,7 @@ pub(super) struct Patches {
     pub placed: Table<PlacedPatch>,
 }
 
-/// What the patches of a try are.
+/// The shape of the patches that are made in one try.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Shape {
     /// As is asked for.
