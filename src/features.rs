@@ -22,6 +22,7 @@ macro_rules! feature {
     };
 }
 
+const CLOUD: Feature = feature!("cloud", "files behind URLs");
 pub(crate) const DEMO: Feature = feature!("demo", "the demonstration");
 const E57: Feature = feature!("e57", "E57");
 pub(crate) const LEVELS: Feature = feature!("levels", "levels of detail");
@@ -31,7 +32,7 @@ const ABLATION: Feature = feature!("ablation", "other constants of the method");
 const FAULTS: Feature = feature!("faults", "fault injection");
 
 /// Those that are off by default come last.
-const ALL: [Feature; 7] = [DEMO, E57, LEVELS, PAGES, VIEW, ABLATION, FAULTS];
+const ALL: [Feature; 8] = [CLOUD, DEMO, E57, LEVELS, PAGES, VIEW, ABLATION, FAULTS];
 
 impl Feature {
     /// An error if the part was left out.

@@ -13,7 +13,7 @@ use std::os::unix::fs::{FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
 /// The format of scratch folders that this program writes and reads.
-const FORMAT: u32 = 14;
+const FORMAT: u32 = 15;
 
 /// Bytes of each sample of an input.
 const SAMPLE: u64 = 64 << 10;
@@ -29,7 +29,10 @@ enum Name {
 impl Name {
     /// The absolute path.
     fn of(path: &Path) -> Result<Self> {
-        let path = std::path::absolute(path).map_err(|e| Error::io(path, "find", e))?;
+        let path = match outcrop_points::is_remote(path) {
+            true => path.to_path_buf(),
+            false => std::path::absolute(path).map_err(|e| Error::io(path, "find", e))?,
+        };
         Ok(match path.as_os_str().to_str() {
             Some(text) => Self::Text(text.to_owned()),
             None => Self::Bytes(path.as_os_str().as_bytes().to_vec()),
@@ -51,12 +54,25 @@ struct Identity {
     bytes: u64,
     /// Seconds and nanoseconds of its last change.
     modified: (i64, i64),
-    /// CRC-32 of four samples: the beginning, the end, and two places between.
+    /// CRC-32 of four samples: the beginning, the end, and two places between; of a remote file 0.
     sample: u32,
+    /// The entity tag of a remote file.
+    tag: Option<String>,
 }
 
 impl Identity {
     fn of(path: &Path) -> Result<Self> {
+        if outcrop_points::is_remote(path) {
+            let version = outcrop_points::version(path)?;
+            let (seconds, nanoseconds) = version.modified;
+            return Ok(Self {
+                path: Name::of(path)?,
+                bytes: version.bytes,
+                modified: (seconds, nanoseconds.into()),
+                sample: 0,
+                tag: version.tag,
+            });
+        }
         let io = |action: &'static str| move |e| Error::io(path, action, e);
         let file = File::open(path).map_err(io("open"))?;
         let meta = file.metadata().map_err(io("read the size of"))?;
@@ -75,13 +91,14 @@ impl Identity {
             bytes: meta.len(),
             modified: (meta.mtime(), meta.mtime_nsec()),
             sample: crc.finalize(),
+            tag: None,
         })
     }
 }
 
 impl Identity {
     /// All but the path, each with its name.
-    fn facts(&self) -> [(&'static str, String); 3] {
+    fn facts(&self) -> [(&'static str, String); 4] {
         let (seconds, nanoseconds) = self.modified;
         [
             ("size", format!("{} bytes", self.bytes)),
@@ -90,6 +107,7 @@ impl Identity {
                 "time of last change",
                 format!("{seconds}.{nanoseconds:09} s"),
             ),
+            ("entity tag", self.tag.clone().unwrap_or_default()),
         ]
     }
 }

@@ -1,7 +1,10 @@
-//! Replaces folders by the point files in them.
+//! Replaces folders, prefixes of stores and lists of URLs by the point files in them.
+
+mod urls;
 
 use super::folder::{Judged, Short, is_scratch, is_tileset, judge, stands_alone};
 use super::formats::readable;
+use super::remote::is_remote;
 use super::stats::LeftOut;
 use outcrop_disk::error::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -18,7 +21,8 @@ pub(super) struct Expanded {
     pub(super) left_out: Vec<LeftOut>,
 }
 
-/// The point files of `inputs`: files are taken as they are, folders recursively, sorted by name.
+/// The point files of `inputs`: files are taken as they are, folders and prefixes of stores recursively, sorted by
+/// name. A text whose first line is a URL is a list of inputs.
 ///
 /// In folders, hidden files and files that are not scans are skipped; links to folders are not followed.
 ///
@@ -32,14 +36,26 @@ pub fn expand(inputs: &[PathBuf]) -> Result<Vec<PathBuf>> {
 pub(super) fn expanded(inputs: &[PathBuf]) -> Result<Expanded> {
     let mut all = Expanded::default();
     for input in inputs {
-        let meta = std::fs::metadata(input).map_err(|e| Error::io(input, "open", e))?;
-        if !meta.is_dir() {
-            all.files.push(input.clone());
+        if let Some(listed) = urls::listed(input)? {
+            all.add(&expanded(&listed)?);
             continue;
         }
         let mut found = Found::default();
-        found.walk(input)?;
-        found.sort_out();
+        if is_remote(input) {
+            let Some(files) = urls::below(input)? else {
+                all.files.push(input.clone());
+                continue;
+            };
+            found.scans = files;
+        } else {
+            let meta = std::fs::metadata(input).map_err(|e| Error::io(input, "open", e))?;
+            if !meta.is_dir() {
+                all.files.push(input.clone());
+                continue;
+            }
+            found.walk(input)?;
+            found.sort_out();
+        }
         if found.scans.is_empty() {
             let expected = format!("at least one file of {}", readable());
             let place = "no point file".to_owned();
@@ -55,6 +71,11 @@ pub(super) fn expanded(inputs: &[PathBuf]) -> Result<Expanded> {
 }
 
 impl Expanded {
+    fn add(&mut self, more: &Self) {
+        self.files.extend_from_slice(&more.files);
+        self.left_out.extend_from_slice(&more.left_out);
+    }
+
     /// A warning about what was left out.
     pub(super) fn warning(&self) -> Option<String> {
         let told = told(&self.left_out)?;

@@ -1,6 +1,9 @@
 //! An input file: positioned reads that are counted, with errors that give the position. Of a compressed file
 //! the content is read, and positions are those in it.
 
+mod remote;
+
+use super::remote::{Remote, is_remote};
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::compressed::{Beginning, Content};
 use outcrop_disk::workspace::mapped::Window;
@@ -37,12 +40,15 @@ enum Source {
     ),
     /// Of a compressed file of which only the header is wanted.
     Memory(Vec<u8>),
+    /// On a server.
+    Remote(Remote),
 }
 
 impl Source {
     fn read_at(&self, buffer: &mut [u8], offset: u64) -> std::io::Result<usize> {
         match self {
             Self::File(file) | Self::Content(file, _) => file.read_at(buffer, offset),
+            Self::Remote(remote) => remote.read_at(buffer, offset),
             Self::Memory(bytes) => {
                 let start = bytes
                     .len()
@@ -56,6 +62,9 @@ impl Source {
 impl Input {
     /// Opens a file to read all of it; of an archive the member that is `wanted`.
     pub(super) fn open(path: &Path, wanted: Wanted<'_>, workspace: &Workspace) -> Result<Self> {
+        if is_remote(path) {
+            return Self::open_remote(path, wanted, workspace);
+        }
         let maps = workspace.maps_inputs();
         let input = Self {
             maps,
@@ -75,6 +84,9 @@ impl Input {
     /// Opens a file of which only the first `most` bytes are read. The size of a compressed one is an
     /// estimate.
     pub(super) fn open_head(path: &Path, wanted: Wanted<'_>, most: usize) -> Result<Self> {
+        if is_remote(path) {
+            return Self::open_remote_head(path, most);
+        }
         let input = Self::of(path, Arc::default())?;
         let Some(beginning) = Beginning::of(path, wanted, most)? else {
             return Ok(input);

@@ -149,6 +149,11 @@ pub(super) trait PointFile {
         None
     }
 
+    /// True if [`PointFile::read`] says itself which parts of the file it will read, with [`Input::expect`].
+    fn says_what_it_reads(&self) -> bool {
+        false
+    }
+
     /// Reads all points, in units of at most a few MiB; returns warnings.
     ///
     /// # Errors

@@ -15,6 +15,7 @@ use super::{Classes, Crs, CrsSource, Layout, Selection, Spool, formats, prj, prj
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::Workspace;
 use outcrop_ply::Scalar;
+use std::iter::once;
 use std::path::PathBuf;
 
 /// Decodes all inputs into the spool `name`.
@@ -61,6 +62,11 @@ pub(super) fn read_all(
             target.skip(opened.claims.likely_points, bounds);
             Vec::new()
         } else {
+            if !opened.file.says_what_it_reads() {
+                opened
+                    .input
+                    .expect(once(0..opened.input.bytes), workspace)?;
+            }
             match opened.file.read(&opened.input, &target) {
                 // Tasks read all files at the same time.
                 Err(Error::Left(_)) => {
@@ -200,6 +206,7 @@ impl IngestStats {
             path: opened.input.path.clone(),
             format: opened.claims.format,
             bytes: opened.input.size,
+            fetched: opened.input.fetched(),
             columns: columns.into_iter().map(|c| c.name).collect(),
             taken: taken.map(|(taken, _)| taken.to_owned()),
             guessed: taken.is_some_and(|(_, guessed)| guessed),

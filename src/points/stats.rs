@@ -5,6 +5,7 @@ use super::coordinate::Coordinate;
 use super::crs::Crs;
 use super::format::Format;
 use super::native::Native;
+use super::remote::Fetched;
 use super::systems::Mixed;
 use serde::{Deserialize, Serialize, Serializer};
 use std::path::{Path, PathBuf};
@@ -70,6 +71,8 @@ pub struct FileStats {
     pub format: Format,
     /// Its size in bytes.
     pub bytes: u64,
+    /// What was asked of the server, if it is on one.
+    pub fetched: Option<Fetched>,
     /// Names of its columns beside the coordinates.
     pub columns: Vec<String>,
     /// Of text: which of its columns are read as what.

@@ -17,8 +17,9 @@ use std::path::{Path, PathBuf};
 use zstd::stream::read::Decoder;
 use zstd::zstd_safe::{DCtx, DParameter};
 
-/// Name of the scratch file; there is one at a time.
-const NAME: &str = "decompressed";
+/// Names of the scratch files; there is one of each at a time.
+const DECOMPRESSED: &str = "decompressed";
+const SAVED: &str = "saved";
 
 /// Bytes of content that are decoded at a time.
 const CHUNK: usize = 1 << 20;
@@ -46,22 +47,33 @@ enum Compression {
 
 impl Compression {
     fn of(file: &File) -> std::io::Result<Option<Self>> {
-        let head = &head_at(file, 0)?[..];
-        Ok(match head {
+        Ok(Self::told_by(&head_at(file, 0)?))
+    }
+
+    fn told_by(head: &[u8]) -> Option<Self> {
+        match head {
             [0x1f, 0x8b, ..] => Some(Self::Gzip),
             _ if is_archive(head) => Some(Self::Zip),
             _ => window(head).map(|_| Self::Zstandard),
-        })
+        }
     }
 }
 
-/// The content of a compressed file, in a scratch file that is deleted when this is dropped.
+/// True if a file that begins with these bytes is compressed; eighteen suffice.
+#[must_use]
+pub fn is_compressed(head: &[u8]) -> bool {
+    Compression::told_by(head).is_some()
+}
+
+/// The content of a compressed file or of a stream, in a scratch file that is deleted when this is dropped.
 #[derive(Debug)]
 pub struct Content {
     /// The scratch file.
     pub path: PathBuf,
     /// Its size in bytes.
     pub bytes: u64,
+    /// The name under which the workspace has it.
+    name: &'static str,
     files: Files,
 }
 
@@ -72,23 +84,73 @@ impl Content {
     /// [`Error::Input`] if it is damaged, or an archive in which not exactly one member is wanted;
     /// [`Error::Memory`] if it needs a window larger than the free part of the budget; [`Error::Io`], [`Error::Disk`], [`Error::Cancelled`].
     pub fn of(path: &Path, wanted: Wanted<'_>, workspace: &Workspace) -> Result<Option<Self>> {
-        let Some((file, compression)) = opened(path)? else {
+        match opened(path)? {
+            Some(file) => Self::decoded(path, &file, wanted, workspace).map(Some),
+            None => Ok(None),
+        }
+    }
+
+    /// The content of an open file, called `path` in errors; none if it is not compressed.
+    ///
+    /// # Errors
+    /// As [`Self::of`].
+    pub fn within(
+        path: &Path,
+        file: File,
+        wanted: Wanted<'_>,
+        workspace: &Workspace,
+    ) -> Result<Option<Self>> {
+        let found = Compression::of(&file).map_err(|e| Error::io(path, "read", e))?;
+        let Some(compression) = found else {
             return Ok(None);
         };
-        let mut held = workspace.promise("decompress", BUFFERS)?;
-        held.set_held(BUFFERS);
-        let scratch = workspace.files.open(NAME, false)?;
-        let mut content = Self {
+        Self::decoded(path, &(file, compression), wanted, workspace).map(Some)
+    }
+
+    /// All that `source`, called `path` in errors, gives.
+    ///
+    /// # Errors
+    /// [`Error::Io`], [`Error::Memory`], [`Error::Disk`], [`Error::Cancelled`].
+    pub fn saved(path: &Path, mut source: impl Read, workspace: &Workspace) -> Result<Self> {
+        let mut held = workspace.promise("save a stream", CHUNK as u64)?;
+        held.set_held(CHUNK as u64);
+        let mut content = Self::empty(SAVED, workspace);
+        let scratch = workspace.files.open(SAVED, false)?;
+        let mut take = |bytes: &[u8]| {
+            workspace.check_cancel()?;
+            content.append(&scratch, bytes)?;
+            Ok(true)
+        };
+        let failed = |_: &_, e| Error::io(path, "read", e);
+        pump(&mut source, &mut vec![0; CHUNK], &mut take, failed)?;
+        Ok(content)
+    }
+
+    fn empty(name: &'static str, workspace: &Workspace) -> Self {
+        Self {
             path: PathBuf::new(),
             bytes: 0,
+            name,
             files: workspace.files.clone(),
-        };
+        }
+    }
+
+    fn decoded(
+        path: &Path,
+        (file, compression): &(File, Compression),
+        wanted: Wanted<'_>,
+        workspace: &Workspace,
+    ) -> Result<Self> {
+        let mut held = workspace.promise("decompress", BUFFERS)?;
+        held.set_held(BUFFERS);
+        let scratch = workspace.files.open(DECOMPRESSED, false)?;
+        let mut content = Self::empty(DECOMPRESSED, workspace);
         let window = |bytes: u64| {
             held.at_least(bytes.saturating_add(BUFFERS))?;
             held.set_held(held.bytes());
             Ok(())
         };
-        let packed = (&file, compression, wanted);
+        let packed = (file, *compression, wanted);
         let read = decode(path, packed, window, |bytes| {
             workspace.check_cancel()?;
             content.append(&scratch, bytes)?;
@@ -99,7 +161,7 @@ impl Content {
             let expected = "compressed points or a compressed mesh";
             return Err(Error::input(path, "content", "nothing", expected));
         }
-        Ok(Some(content))
+        Ok(content)
     }
 
     fn append(&mut self, scratch: &ScratchFile, bytes: &[u8]) -> Result<()> {
@@ -113,7 +175,7 @@ impl Content {
 impl Drop for Content {
     fn drop(&mut self) {
         // If it cannot be deleted, it is when the folder is removed.
-        let _ = self.files.release(NAME);
+        let _ = self.files.release(self.name);
     }
 }
 
@@ -136,6 +198,31 @@ impl Beginning {
         let Some((file, compression)) = opened(path)? else {
             return Ok(None);
         };
+        let all = file.metadata();
+        let all = all.map_err(|e| Error::io(path, "read the size of", e))?;
+        Self::decoded(path, (&file, compression, wanted), all.len(), least).map(Some)
+    }
+
+    /// As [`Self::of`], of a file of `all` bytes that is called `path` and of which `file` has the first; what
+    /// ends with those is no error. None for an archive: what is in it stands at its end.
+    ///
+    /// # Errors
+    /// As [`Self::of`].
+    pub fn within(path: &Path, file: &File, all: u64, least: usize) -> Result<Option<Self>> {
+        let found = Compression::of(file).map_err(|e| Error::io(path, "read", e))?;
+        let Some(compression @ (Compression::Gzip | Compression::Zstandard)) = found else {
+            return Ok(None);
+        };
+        let none: Wanted<'_> = &|_, _, _| false;
+        Self::decoded(path, (file, compression, none), all, least).map(Some)
+    }
+
+    fn decoded(
+        path: &Path,
+        packed: (&File, Compression, Wanted<'_>),
+        all: u64,
+        least: usize,
+    ) -> Result<Self> {
         let window = |bytes| match bytes > WINDOW {
             true => {
                 let found = format!("a window of {bytes} bytes");
@@ -145,21 +232,23 @@ impl Beginning {
             false => Ok(()),
         };
         let mut bytes = Vec::new();
-        let packed = (&file, compression, wanted);
+        let here = packed.0.metadata().map_or(all, |about| about.len());
         let read = decode(path, packed, window, |chunk| {
             bytes.extend_from_slice(chunk);
             Ok(bytes.len() < least)
-        })?;
-        let all = file.metadata();
-        let all = all.map_err(|e| Error::io(path, "read the size of", e))?;
+        });
+        let read = match read {
+            Err(Error::Input { .. }) if here < all && !bytes.is_empty() => here,
+            read => read?,
+        };
         let now = bytes.len() as u64;
         // If it is long enough there may be more, even where no byte of the file is left.
-        let share = all.len().max(read) as f64 / read.max(1) as f64;
+        let share = all.max(read) as f64 / read.max(1) as f64;
         let likely = match now < least as u64 {
             true => now,
             false => (now as f64 * share) as u64 + 1,
         };
-        Ok(Some(Self { bytes, likely }))
+        Ok(Self { bytes, likely })
     }
 }
 

@@ -51,12 +51,15 @@ pub(super) fn read(
         Some(table) => table,
         None if header.format.is_extended => table::walk(input, header, &laszip, workspace)?,
         None => {
+            input.expect(std::iter::once(header.data..input.bytes), workspace)?;
             one_by_one(&decoder, writer)?;
             return Ok(warnings);
         }
     };
     limit(input, header, &laszip, &mut table, &mut warnings)?;
     warnings.extend(skip::outside(input, header, &mut table.chunks, writer)?);
+    let parts = table.chunks.iter().map(|c| c.at..c.at + c.bytes);
+    input.expect(parts, workspace)?;
     in_parallel(&decoder, &table.chunks, writer)?;
     Ok(warnings)
 }

@@ -73,6 +73,10 @@ impl PointFormat for Las {
 }
 
 impl PointFile for Header {
+    fn says_what_it_reads(&self) -> bool {
+        self.format.is_compressed
+    }
+
     fn claims(&self, input: &Input) -> Claims {
         let raw = &self.raw;
         let (format, least) = match self.format.is_compressed {

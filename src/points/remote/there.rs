@@ -1,0 +1,122 @@
+//! Remote files, by `outcrop-remote`.
+
+use super::{Fetched, Version};
+use outcrop_disk::error::{Error, Result};
+use outcrop_disk::workspace::compressed::Content;
+use outcrop_disk::workspace::memory::Reservation;
+use outcrop_disk::workspace::{Workspace, lock};
+use outcrop_remote::{Counts, Location, Object};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
+
+/// Most files below a prefix: the names of so many take some hundred megabytes.
+const MOST: usize = 1 << 20;
+
+/// Most memory for parts that are fetched before they are read, and its share of what is free. Half of it keeps
+/// eight requests of 2 MiB under way.
+const AHEAD: u64 = 32 << 20;
+const SHARE: u64 = 8;
+
+/// A remote file that is open.
+#[derive(Debug)]
+pub(in super::super) struct Remote {
+    object: Object,
+    /// Memory for what is fetched before it is read.
+    held: Mutex<Option<Reservation>>,
+}
+
+impl Remote {
+    /// Opens a remote file.
+    pub(in super::super) fn open(path: &Path) -> Result<Self> {
+        let object = Object::open(&location(path)?, &Arc::default());
+        Ok(Self {
+            object: object.map_err(|e| Error::io(path, "open", e))?,
+            held: Mutex::default(),
+        })
+    }
+
+    pub(in super::super) fn version(&self) -> Version {
+        Version {
+            bytes: self.object.size(),
+            tag: self.object.tag().map(ToOwned::to_owned),
+            modified: self.object.modified(),
+        }
+    }
+
+    /// True if the server sends parts of the file.
+    pub(in super::super) fn has_parts(&self) -> bool {
+        self.object.has_parts()
+    }
+
+    pub(in super::super) fn read_at(
+        &self,
+        buffer: &mut [u8],
+        offset: u64,
+    ) -> std::io::Result<usize> {
+        self.object.read_at(buffer, offset)
+    }
+
+    /// Says what will be read, in this order, so that it is fetched before.
+    pub(in super::super) fn expect(
+        &self,
+        ranges: impl IntoIterator<Item = Range<u64>>,
+        workspace: &Workspace,
+    ) -> Result<()> {
+        let mut held = lock(&self.held);
+        *held = None;
+        // Of files that tasks share, each reads parts that are not known before.
+        let memory = match workspace.is_shared() {
+            true => 0,
+            false => AHEAD.min(workspace.memory.available() / SHARE),
+        };
+        *held = Some(workspace.reserve("fetched ahead", memory)?);
+        self.object.expect(ranges, memory);
+        Ok(())
+    }
+
+    /// The whole file in the scratch folder.
+    pub(in super::super) fn save(&self, path: &Path, workspace: &Workspace) -> Result<Content> {
+        self.expect(std::iter::once(0..self.object.size()), workspace)?;
+        let source = self
+            .object
+            .whole()
+            .map_err(|e| Error::io(path, "read", e))?;
+        Content::saved(path, source, workspace)
+    }
+
+    pub(in super::super) fn fetched(&self) -> Fetched {
+        let counts = self.object.counts();
+        Fetched {
+            requests: counts.requests(),
+            bytes: counts.bytes(),
+        }
+    }
+}
+
+fn location(path: &Path) -> Result<Location> {
+    Location::of(path).map_err(|why| {
+        let expected = "one such as https://host/scan.laz or s3://bucket/scan.laz, with credentials from the \
+                        environment";
+        Error::input(path, "URL", why.to_string(), expected)
+    })
+}
+
+/// The files below a prefix, with their sizes; none if the path names one file.
+pub(in super::super) fn below(path: &Path) -> Result<Option<Vec<(PathBuf, u64)>>> {
+    let prefix = location(path)?;
+    if !prefix.is_prefix() {
+        return Ok(None);
+    }
+    if prefix.is_web() {
+        let found = "a folder of a web server, which lists no files";
+        let expected = "URLs of files, or a file with a list of them";
+        return Err(Error::input(path, "URL", found, expected));
+    }
+    let listed = outcrop_remote::list(&prefix, MOST, &Arc::<Counts>::default())
+        .map_err(|e| Error::io(path, "list", e))?;
+    let files = listed
+        .into_iter()
+        .map(|file| (file.location.to_string().into(), file.bytes));
+    Ok(Some(files.collect()))
+}

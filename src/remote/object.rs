@@ -1,0 +1,265 @@
+//! A remote file that is read by ranges.
+
+use super::agent::Counts;
+use super::ahead::Ahead;
+use super::location::Location;
+use super::stores::{Patience, Place, place};
+use super::wait::wait;
+use super::whole::{Answer, Whole};
+use bytes::Bytes;
+use object_store::{Error, GetOptions, GetRange, GetResult, ObjectStore};
+use std::error::Error as _;
+use std::io::{self, ErrorKind};
+use std::ops::Range;
+use std::sync::{Arc, PoisonError, RwLock};
+use std::time::{Duration, Instant};
+
+/// Bytes that the first request asks for: most headers are in them.
+const HEAD: u64 = 64 << 10;
+
+/// Bytes that are kept of a file that cannot be read in parts: the most that tell a format.
+const LONG_HEAD: u64 = 1 << 20;
+
+/// A pause after an answer that broke off.
+const PAUSE: Duration = Duration::from_millis(500);
+
+/// A remote file.
+#[derive(Debug)]
+pub struct Object {
+    pub(crate) file: Arc<Remote>,
+    /// Its first bytes.
+    head: Bytes,
+    ahead: RwLock<Option<Ahead>>,
+}
+
+/// What a request for a part of the file needs.
+#[derive(Debug)]
+pub(crate) struct Remote {
+    place: Place,
+    /// Size in bytes.
+    size: u64,
+    /// What changes with the content, if the server says it.
+    tag: Option<String>,
+    /// Seconds since 1970 of the last change, and nanoseconds.
+    modified: (i64, u32),
+    counts: Arc<Counts>,
+    has_parts: bool,
+}
+
+impl Object {
+    /// Opens a remote file: asks for its size, its version and its first bytes.
+    ///
+    /// # Errors
+    /// [`ErrorKind::NotFound`], [`ErrorKind::PermissionDenied`]; [`ErrorKind::Unsupported`] if the server knows no
+    /// ranges; anything else that ends a request, after some seconds.
+    pub fn open(location: &Location, counts: &Arc<Counts>) -> io::Result<Self> {
+        let first = place(location, Patience::Short, counts).map_err(told)?;
+        let (got, has_parts) = match ask(&first, Some(0..HEAD), None) {
+            Ok(got) => (got, true),
+            // The server has no ranges, or nothing is in the file.
+            Err(e) if e.kind() == ErrorKind::Unsupported => (ask(&first, None, None)?, false),
+            Err(e) => return Err(e),
+        };
+        let meta = got.meta.clone();
+        let kept = meta.size.min(if has_parts { HEAD } else { LONG_HEAD });
+        let head = Answer::of(got).take(kept)?;
+        let file = Remote {
+            place: place(location, Patience::Long, counts).map_err(told)?,
+            size: meta.size,
+            tag: meta.e_tag,
+            modified: (
+                meta.last_modified.timestamp(),
+                meta.last_modified.timestamp_subsec_nanos(),
+            ),
+            counts: counts.clone(),
+            has_parts,
+        };
+        Ok(Self {
+            file: Arc::new(file),
+            head,
+            ahead: RwLock::default(),
+        })
+    }
+
+    /// Size in bytes.
+    #[must_use]
+    pub fn size(&self) -> u64 {
+        self.file.size
+    }
+
+    /// True if the server sends parts of the file. Else only [`Self::whole`] reads it, and [`Self::read_at`] its
+    /// first MiB.
+    #[must_use]
+    pub fn has_parts(&self) -> bool {
+        self.file.has_parts
+    }
+
+    /// A reader of the whole file. If the server sends no parts, an answer that breaks off is an error.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn whole(&self) -> io::Result<Whole<'_>> {
+        match self.has_parts() {
+            true => Ok(Whole::of_parts(self)),
+            false => Ok(Whole::of_stream(self.file.stream()?, self.size())),
+        }
+    }
+
+    /// The entity tag, which changes with the content; none if the server says none.
+    #[must_use]
+    pub fn tag(&self) -> Option<&str> {
+        self.file.tag.as_deref()
+    }
+
+    /// Seconds since 1970 and nanoseconds of the last change.
+    #[must_use]
+    pub fn modified(&self) -> (i64, u32) {
+        self.file.modified
+    }
+
+    /// Requests and bytes so far.
+    #[must_use]
+    pub fn counts(&self) -> &Counts {
+        &self.file.counts
+    }
+
+    /// Fetches ranges before they are read, with requests side by side that hold at most `bytes`. Replaces the
+    /// ranges of an earlier call. Ranges are in the order in which they will be read.
+    pub fn expect(&self, ranges: impl IntoIterator<Item = Range<u64>>, bytes: u64) {
+        let ahead = self.ahead.write();
+        let mut ahead = ahead.unwrap_or_else(PoisonError::into_inner);
+        // The threads of the earlier ones end first.
+        *ahead = None;
+        *ahead = Some(Ahead::new(&self.file, ranges, bytes));
+    }
+
+    /// Fills `buffer` from `offset`, as far as the file reaches; returns the bytes read.
+    ///
+    /// # Errors
+    /// As [`Self::open`], after minutes of failed requests; [`ErrorKind::InvalidData`] if the file has changed since
+    /// it was opened.
+    pub fn read_at(&self, buffer: &mut [u8], offset: u64) -> io::Result<usize> {
+        let left = self.size().saturating_sub(offset);
+        let wanted = buffer
+            .len()
+            .min(usize::try_from(left).unwrap_or(usize::MAX));
+        let buffer = &mut buffer[..wanted];
+        if wanted == 0 {
+            return Ok(0);
+        }
+        let end = offset + wanted as u64;
+        if end <= self.head.len() as u64 {
+            buffer.copy_from_slice(&self.head[offset as usize..end as usize]);
+            return Ok(wanted);
+        }
+        let ahead = self.ahead.read().unwrap_or_else(PoisonError::into_inner);
+        if let Some(ahead) = &*ahead
+            && let Some(done) = ahead.read(buffer, offset)?
+        {
+            return Ok(done);
+        }
+        drop(ahead);
+        let bytes = self.file.fetch(offset..end)?;
+        buffer.copy_from_slice(&bytes);
+        Ok(wanted)
+    }
+}
+
+impl Remote {
+    /// The bytes of a range inside the file. An answer that breaks off is asked for again.
+    pub(crate) fn fetch(&self, range: Range<u64>) -> io::Result<Bytes> {
+        let begun = Instant::now();
+        loop {
+            match self.once(range.clone()) {
+                Err(e)
+                    if e.kind() == ErrorKind::UnexpectedEof
+                        && begun.elapsed() < Patience::Long.time() =>
+                {
+                    std::thread::sleep(PAUSE);
+                }
+                done => return done,
+            }
+        }
+    }
+
+    fn once(&self, range: Range<u64>) -> io::Result<Bytes> {
+        let got = self.ask(Some(range.clone()))?;
+        Answer::of(got).take(range.end - range.start)
+    }
+
+    /// All bytes, as they arrive.
+    fn stream(&self) -> io::Result<Answer> {
+        Ok(Answer::of(self.ask(None)?))
+    }
+
+    fn ask(&self, range: Option<Range<u64>>) -> io::Result<GetResult> {
+        // A weak tag is of no use for this.
+        let tag = self.tag.clone().filter(|tag| !tag.starts_with("W/"));
+        let got = ask(&self.place, range, tag)?;
+        match (got.meta.size, &got.meta.e_tag) == (self.size, &self.tag) {
+            true => Ok(got),
+            false => Err(changed()),
+        }
+    }
+}
+
+/// Asks for a range, or for the whole file.
+fn ask(
+    (store, path): &Place,
+    range: Option<Range<u64>>,
+    tag: Option<String>,
+) -> io::Result<GetResult> {
+    let options = GetOptions {
+        range: range.map(GetRange::Bounded),
+        if_match: tag,
+        ..GetOptions::default()
+    };
+    wait(store.get_opts(path, options))?.map_err(told)
+}
+
+pub(crate) fn changed() -> io::Error {
+    io::Error::new(
+        ErrorKind::InvalidData,
+        "the file has changed on the server since it was opened",
+    )
+}
+
+/// An error of a store in one line, of the kind that a local file would give.
+pub(crate) fn told(error: Error) -> io::Error {
+    let kind = match &error {
+        Error::NotFound { .. } => ErrorKind::NotFound,
+        Error::PermissionDenied { .. } | Error::Unauthenticated { .. } => {
+            ErrorKind::PermissionDenied
+        }
+        Error::AlreadyExists { .. } => ErrorKind::AlreadyExists,
+        Error::Precondition { .. } => return changed(),
+        Error::NotSupported { .. } | Error::NotImplemented { .. } => ErrorKind::Unsupported,
+        // An empty file has no range.
+        e if e.to_string().contains("416 Range Not Satisfiable") => ErrorKind::Unsupported,
+        _ => ErrorKind::Other,
+    };
+    // The innermost reasons say what happened; the outer ones repeat each other.
+    let mut reasons = vec![error.to_string()];
+    let mut inner = error.source();
+    while let Some(reason) = inner {
+        reasons.push(reason.to_string());
+        inner = reason.source();
+    }
+    let last = reasons.pop().unwrap_or_default();
+    let status = reasons.iter().find_map(|text| status_in(text));
+    let text = match status {
+        Some(status) if !last.contains(&status) => format!("{status}: {last}"),
+        _ => last,
+    };
+    let line: Vec<&str> = text.split_whitespace().collect();
+    io::Error::new(kind, line.join(" "))
+}
+
+/// The status of HTTP in a message, such as `503 Service Unavailable`.
+fn status_in(text: &str) -> Option<String> {
+    let (_, after) = text
+        .split_once("status code: ")
+        .or(text.split_once("status "))?;
+    let end = after.find([':', ',']).unwrap_or(after.len());
+    Some(after[..end].trim().to_owned())
+}
