@@ -33,7 +33,7 @@ pub(super) const CONFIDENCE: &str = "confidence";
 const MADE: [&str; 2] = [DISPLACEMENT, CONFIDENCE];
 
 /// Other names of columns, in lower case.
-const ALIASES: [(&str, &str); 12] = [
+const ALIASES: [(&str, &str); 15] = [
     ("r", "red"),
     ("g", "green"),
     ("b", "blue"),
@@ -46,6 +46,9 @@ const ALIASES: [(&str, &str); 12] = [
     ("pointsourceid", "point_source"),
     ("point_source_id", "point_source"),
     ("returnnumber", "return_number"),
+    ("numberofreturns", "number_of_returns"),
+    ("scananglerank", "scan_angle"),
+    ("userdata", "user_data"),
 ];
 
 /// Names of the columns of a normal, as they are known in all formats: of PLY and CloudCompare, of PCD, of the

@@ -2,6 +2,7 @@
 
 mod urls;
 
+use super::ept;
 use super::folder::{Judged, Short, is_scratch, is_tileset, judge, stands_alone};
 use super::formats::readable;
 use super::remote::is_remote;
@@ -114,6 +115,12 @@ impl Found {
     }
 
     fn walk(&mut self, folder: &Path) -> Result<()> {
+        let tiles = folder.join(ept::NAME);
+        if tiles.is_file() {
+            // It stands for the files below.
+            self.scans.push((tiles, 0));
+            return Ok(());
+        }
         let failed = |e| Error::io(folder, "list", e);
         let mut entries = std::fs::read_dir(folder)
             .and_then(Iterator::collect::<std::io::Result<Vec<_>>>)

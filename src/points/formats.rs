@@ -1,6 +1,7 @@
 //! The list of input formats, and the detection of a file's format.
 
 use super::e57::E57;
+use super::ept::Ept;
 use super::foreign;
 use super::format::Format;
 use super::input::Input;
@@ -18,7 +19,7 @@ use serde::{Deserialize, Deserializer};
 use std::path::Path;
 
 /// All formats, in the order in which they are tested. Text is last: its error explains why no format fits.
-pub(super) const FORMATS: [&dyn PointFormat; 7] = [&Las, &E57, &Ply, &Pcd, &Ptx, &Off, &Text];
+pub(super) const FORMATS: [&dyn PointFormat; 8] = [&Las, &Ept, &E57, &Ply, &Pcd, &Ptx, &Off, &Text];
 
 /// Bytes at the start of a file that are used for detection.
 const HEAD: usize = 64 << 10;

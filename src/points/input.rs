@@ -1,6 +1,7 @@
 //! An input file: positioned reads that are counted, with errors that give the position. Of a compressed file
 //! the content is read, and positions are those in it.
 
+pub(super) mod beside;
 mod remote;
 
 use super::remote::{Remote, is_remote};

@@ -22,6 +22,7 @@ mod crop;
 mod crs;
 mod directions;
 mod e57;
+mod ept;
 mod expand;
 mod far;
 mod folder;

@@ -5,7 +5,7 @@ mod there;
 
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-pub(super) use there::{Remote, below};
+pub(super) use there::{Beside, Expected, Remote, below};
 
 /// The schemes of URLs that are read.
 const SCHEMES: [&str; 9] = [

@@ -4,7 +4,6 @@
 //! hold no more than the memory that they were given. A reader that is ahead of them fetches its piece itself; so
 //! nobody waits for room.
 
-use super::object::Remote;
 use bytes::Bytes;
 use std::io;
 use std::ops::Range;
@@ -49,31 +48,64 @@ struct Pieces {
     ended: bool,
 }
 
-/// Pieces of one file, and the threads that fetch them.
-#[derive(Debug)]
+/// Fetches the piece of this number and range.
+type Fetch = Box<dyn Fn(usize, Range<u64>) -> io::Result<Bytes> + Send + Sync>;
+
+/// Pieces, and the threads that fetch them.
 pub(crate) struct Ahead {
     shared: Arc<Shared>,
     threads: Vec<JoinHandle<()>>,
 }
 
-#[derive(Debug)]
+impl std::fmt::Debug for Ahead {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let threads = self.threads.len();
+        f.debug_struct("Ahead")
+            .field("threads", &threads)
+            .finish_non_exhaustive()
+    }
+}
+
 struct Shared {
     pieces: Mutex<Pieces>,
     changed: Condvar,
-    file: Arc<Remote>,
+    fetch: Fetch,
     most: u64,
 }
 
 impl Ahead {
-    /// Pieces of these ranges. Without memory for a piece, each is fetched when it is read first.
-    pub(crate) fn new(
-        file: &Arc<Remote>,
+    /// Pieces of these ranges of one file. Without memory for a piece, each is fetched when it is read first.
+    pub(crate) fn of_ranges(
         ranges: impl IntoIterator<Item = Range<u64>>,
         bytes: u64,
+        fetch: impl Fn(Range<u64>) -> io::Result<Bytes> + Send + Sync + 'static,
     ) -> Self {
-        let (all, order) = pieces(ranges);
-        let threads = usize::try_from(bytes / PIECE).map_or(REQUESTS, |n| n.min(REQUESTS));
-        let threads = threads.min(all.len());
+        Self::new(
+            pieces(ranges),
+            bytes,
+            Box::new(move |_, range| fetch(range)),
+        )
+    }
+
+    /// Files that are pieces, of at most so many bytes each, in the order in which they are read.
+    pub(crate) fn of_files(
+        sizes: impl IntoIterator<Item = u64>,
+        bytes: u64,
+        fetch: impl Fn(usize) -> io::Result<Bytes> + Send + Sync + 'static,
+    ) -> Self {
+        let mut end = 0;
+        let place = |size: u64| {
+            let start = end;
+            end += size.max(1);
+            start..end
+        };
+        let all: Vec<Range<u64>> = sizes.into_iter().map(place).collect();
+        let order = (0..all.len()).collect();
+        Self::new((all, order), bytes, Box::new(move |file, _| fetch(file)))
+    }
+
+    fn new((all, order): (Vec<Range<u64>>, Vec<usize>), bytes: u64, fetch: Fetch) -> Self {
+        let threads = REQUESTS.min(all.len()) * usize::from(bytes > 0);
         let all = all.into_iter().map(|range| Piece {
             range,
             state: State::Waiting,
@@ -87,7 +119,7 @@ impl Ahead {
                 ended: false,
             }),
             changed: Condvar::new(),
-            file: file.clone(),
+            fetch,
             most: bytes,
         });
         let thread = |_| {
@@ -102,6 +134,24 @@ impl Ahead {
     /// Fills `buffer` from `offset` as far as the piece there reaches; none outside of all pieces.
     pub(crate) fn read(&self, buffer: &mut [u8], offset: u64) -> io::Result<Option<usize>> {
         self.shared.read(buffer, offset)
+    }
+
+    /// All of a file that is a piece; it is taken once.
+    pub(crate) fn take(&self, file: usize) -> io::Result<Bytes> {
+        let mut pieces = self.shared.here(self.shared.lock(), file)?;
+        let piece = &mut pieces.all[file];
+        match std::mem::replace(&mut piece.state, State::Gone) {
+            State::Here(bytes, _) => {
+                self.shared.free(pieces, bytes.len() as u64);
+                Ok(bytes)
+            }
+            // It was taken before, or a thread failed to fetch it.
+            _ => {
+                let range = piece.range.clone();
+                drop(pieces);
+                (self.shared.fetch)(file, range)
+            }
+        }
     }
 }
 
@@ -155,7 +205,7 @@ impl Shared {
     fn run(&self) {
         while let Some((piece, range)) = self.take() {
             // What fails here is asked for again by its reader, who tells the error.
-            let got = self.file.fetch(range.clone()).ok();
+            let got = (self.fetch)(piece, range.clone()).ok();
             self.put(piece, &range, got);
         }
     }
@@ -185,60 +235,47 @@ impl Shared {
     }
 
     fn put(&self, piece: usize, range: &Range<u64>, got: Option<Bytes>) {
-        let size = range.end - range.start;
         let mut pieces = self.lock();
+        // A file may be smaller than it can be at most.
+        let size = got.as_ref().map_or(0, |bytes| bytes.len() as u64);
         pieces.all[piece].state = match got {
             Some(bytes) => State::Here(bytes, size),
-            None => {
-                pieces.held -= size;
-                State::Gone
-            }
+            None => State::Gone,
         };
+        self.free(pieces, (range.end - range.start).saturating_sub(size));
+    }
+
+    /// Gives memory back, and tells the threads that wait for it.
+    fn free(&self, mut pieces: MutexGuard<'_, Pieces>, bytes: u64) {
+        pieces.held = pieces.held.saturating_sub(bytes);
         drop(pieces);
         self.changed.notify_all();
     }
 
-    fn read(&self, buffer: &mut [u8], offset: u64) -> io::Result<Option<usize>> {
-        let mut pieces = self.lock();
-        let after = pieces.all.partition_point(|p| p.range.start <= offset);
-        let Some(number) = after.checked_sub(1) else {
-            return Ok(None);
-        };
+    /// Waits until a piece is here or gone; fetches it if nobody has begun to.
+    fn here<'a>(
+        &'a self,
+        mut pieces: MutexGuard<'a, Pieces>,
+        number: usize,
+    ) -> io::Result<MutexGuard<'a, Pieces>> {
         loop {
             let piece = &mut pieces.all[number];
-            let (range, at) = (piece.range.clone(), offset - piece.range.start);
-            let size = range.end - range.start;
-            if at >= size {
-                return Ok(None);
-            }
-            match &mut piece.state {
-                State::Here(bytes, left) => {
-                    let from = &bytes[at as usize..];
-                    let done = buffer.len().min(from.len());
-                    buffer[..done].copy_from_slice(&from[..done]);
-                    *left = left.saturating_sub(done as u64);
-                    if *left == 0 {
-                        piece.state = State::Gone;
-                        pieces.held -= size;
-                        self.changed.notify_all();
-                    }
-                    return Ok(Some(done));
-                }
-                State::Gone => return Ok(None),
+            match piece.state {
+                State::Here(..) | State::Gone => return Ok(pieces),
                 State::Asked => {
                     let woken = self.changed.wait(pieces);
                     pieces = woken.unwrap_or_else(PoisonError::into_inner);
                 }
                 State::Waiting => {
+                    let range = piece.range.clone();
                     piece.state = State::Asked;
-                    pieces.held += size;
+                    pieces.held += range.end - range.start;
                     drop(pieces);
-                    let got = self.file.fetch(range.clone());
-                    let (bytes, failed) = match got {
+                    let (got, failed) = match (self.fetch)(number, range.clone()) {
                         Ok(bytes) => (Some(bytes), None),
                         Err(e) => (None, Some(e)),
                     };
-                    self.put(number, &range, bytes);
+                    self.put(number, &range, got);
                     if let Some(e) = failed {
                         return Err(e);
                     }
@@ -246,6 +283,32 @@ impl Shared {
                 }
             }
         }
+    }
+
+    fn read(&self, buffer: &mut [u8], offset: u64) -> io::Result<Option<usize>> {
+        let pieces = self.lock();
+        let after = pieces.all.partition_point(|p| p.range.start <= offset);
+        let Some(number) = after.checked_sub(1) else {
+            return Ok(None);
+        };
+        let range = pieces.all[number].range.clone();
+        if offset >= range.end {
+            return Ok(None);
+        }
+        let mut pieces = self.here(pieces, number)?;
+        let piece = &mut pieces.all[number];
+        let State::Here(bytes, left) = &mut piece.state else {
+            return Ok(None);
+        };
+        let from = &bytes[(offset - range.start) as usize..];
+        let done = buffer.len().min(from.len());
+        buffer[..done].copy_from_slice(&from[..done]);
+        *left = left.saturating_sub(done as u64);
+        if *left == 0 {
+            piece.state = State::Gone;
+            self.free(pieces, range.end - range.start);
+        }
+        Ok(Some(done))
     }
 }
 

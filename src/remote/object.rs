@@ -123,6 +123,12 @@ impl Object {
         &self.file.counts
     }
 
+    /// The same, to be shared with other files.
+    #[must_use]
+    pub fn shared_counts(&self) -> &Arc<Counts> {
+        &self.file.counts
+    }
+
     /// Fetches ranges before they are read, with requests side by side that hold at most `bytes`. Replaces the
     /// ranges of an earlier call. Ranges are in the order in which they will be read.
     pub fn expect(&self, ranges: impl IntoIterator<Item = Range<u64>>, bytes: u64) {
@@ -130,7 +136,10 @@ impl Object {
         let mut ahead = ahead.unwrap_or_else(PoisonError::into_inner);
         // The threads of the earlier ones end first.
         *ahead = None;
-        *ahead = Some(Ahead::new(&self.file, ranges, bytes));
+        let file = self.file.clone();
+        *ahead = Some(Ahead::of_ranges(ranges, bytes, move |range| {
+            file.fetch(range)
+        }));
     }
 
     /// Fills `buffer` from `offset`, as far as the file reaches; returns the bytes read.
@@ -168,18 +177,7 @@ impl Object {
 impl Remote {
     /// The bytes of a range inside the file. An answer that breaks off is asked for again.
     pub(crate) fn fetch(&self, range: Range<u64>) -> io::Result<Bytes> {
-        let begun = Instant::now();
-        loop {
-            match self.once(range.clone()) {
-                Err(e)
-                    if e.kind() == ErrorKind::UnexpectedEof
-                        && begun.elapsed() < Patience::Long.time() =>
-                {
-                    std::thread::sleep(PAUSE);
-                }
-                done => return done,
-            }
-        }
+        again(|| self.once(range.clone()))
     }
 
     fn once(&self, range: Range<u64>) -> io::Result<Bytes> {
@@ -203,8 +201,24 @@ impl Remote {
     }
 }
 
+/// Repeats a request whose answer breaks off.
+pub(crate) fn again(mut once: impl FnMut() -> io::Result<Bytes>) -> io::Result<Bytes> {
+    let begun = Instant::now();
+    loop {
+        match once() {
+            Err(e)
+                if e.kind() == ErrorKind::UnexpectedEof
+                    && begun.elapsed() < Patience::Long.time() =>
+            {
+                std::thread::sleep(PAUSE);
+            }
+            done => return done,
+        }
+    }
+}
+
 /// Asks for a range, or for the whole file.
-fn ask(
+pub(crate) fn ask(
     (store, path): &Place,
     range: Option<Range<u64>>,
     tag: Option<String>,

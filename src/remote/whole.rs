@@ -38,6 +38,21 @@ impl Answer {
     }
 }
 
+impl Answer {
+    /// All bytes, which may be at most `most`.
+    pub(crate) fn all(mut self, most: u64) -> io::Result<Bytes> {
+        let mut all = Vec::new();
+        while let Some(part) = self.next()? {
+            if part.len() as u64 > most - all.len() as u64 {
+                let why = format!("it is larger than {most} bytes");
+                return Err(io::Error::new(ErrorKind::InvalidData, why));
+            }
+            all.extend_from_slice(&part);
+        }
+        Ok(all.into())
+    }
+}
+
 /// An error in the middle of an answer.
 fn broken(error: Error) -> io::Error {
     match error {

@@ -10,6 +10,7 @@ use super::vlr::{self, Laszip};
 use super::{Header, Record, skip};
 use laz::LazItemType;
 use outcrop_disk::error::Result;
+use outcrop_disk::workspace::Workspace;
 
 /// Memory of the decoder's models, without those of extra bytes.
 const MODELS: u64 = 1 << 20;
@@ -43,13 +44,8 @@ pub(super) fn read(
         laszip: &laszip,
         record: Record::of(header, writer.classes, &fields),
     };
-    let table = match laszip.stream {
-        true => None,
-        false => table::read(input, header, &laszip, workspace)?,
-    };
-    let mut table = match table {
+    let mut table = match chunks(input, header, &laszip, workspace)? {
         Some(table) => table,
-        None if header.format.is_extended => table::walk(input, header, &laszip, workspace)?,
         None => {
             input.expect(std::iter::once(header.data..input.bytes), workspace)?;
             one_by_one(&decoder, writer)?;
@@ -64,8 +60,42 @@ pub(super) fn read(
     Ok(warnings)
 }
 
+/// The chunks; none if they are only known after the points before them have been decoded.
+fn chunks(
+    input: &Input,
+    header: &Header,
+    laszip: &Laszip,
+    workspace: &Workspace,
+) -> Result<Option<Table>> {
+    let table = match laszip.stream {
+        true => None,
+        false => table::read(input, header, laszip, workspace)?,
+    };
+    match table {
+        None if header.format.is_extended => {
+            table::walk(input, header, laszip, workspace).map(Some)
+        }
+        table => Ok(table),
+    }
+}
+
+/// The chunks of a small file with their points, which must be known.
+pub(super) fn table_of(
+    input: &Input,
+    header: &Header,
+    laszip: &Laszip,
+    workspace: &Workspace,
+    warnings: &mut Vec<String>,
+) -> Result<Table> {
+    let Some(mut table) = chunks(input, header, laszip, workspace)? else {
+        return Err(input.error("chunk table", "none", "one"));
+    };
+    limit(input, header, laszip, &mut table, warnings)?;
+    Ok(table)
+}
+
 /// Rejects a number of points that is impossible for the size of the file.
-fn plausible(input: &Input, points: u64) -> Result<()> {
+pub(super) fn plausible(input: &Input, points: u64) -> Result<()> {
     let most = FEW + PER_BYTE * input.bytes;
     if points <= most {
         return Ok(());

@@ -12,9 +12,11 @@ mod laz;
 mod plain;
 mod skip;
 mod table;
+mod tile;
 mod vlr;
 
 use header::Header;
+pub(super) use tile::Laz;
 
 /// Byte of a record with the withheld flag, in all point formats.
 const FLAGS: usize = 15;

@@ -65,11 +65,7 @@ impl Remote {
     ) -> Result<()> {
         let mut held = lock(&self.held);
         *held = None;
-        // Of files that tasks share, each reads parts that are not known before.
-        let memory = match workspace.is_shared() {
-            true => 0,
-            false => AHEAD.min(workspace.memory.available() / SHARE),
-        };
+        let memory = memory_ahead(workspace);
         *held = Some(workspace.reserve("fetched ahead", memory)?);
         self.object.expect(ranges, memory);
         Ok(())
@@ -91,6 +87,58 @@ impl Remote {
             requests: counts.requests(),
             bytes: counts.bytes(),
         }
+    }
+
+    /// The files in its folder.
+    pub(in super::super) fn beside(&self, path: &Path) -> Result<Beside> {
+        let beside = outcrop_remote::Beside::of(&location(path)?, self.object.shared_counts());
+        beside.map(Beside).map_err(|e| Error::io(path, "open", e))
+    }
+}
+
+/// The files in the folder of a remote file.
+#[derive(Debug)]
+pub(in super::super) struct Beside(outcrop_remote::Beside);
+
+impl Beside {
+    /// The bytes of a file, at most `most`.
+    pub(in super::super) fn read(&self, name: &str, most: u64) -> std::io::Result<Vec<u8>> {
+        self.0.read(name, most).map(Into::into)
+    }
+
+    /// Files, each with its largest size, that are fetched before they are read, if the memory suffices.
+    pub(in super::super) fn expect(
+        &self,
+        files: Vec<(String, u64)>,
+        workspace: &Workspace,
+    ) -> Result<Expected> {
+        let memory = memory_ahead(workspace);
+        Ok(Expected {
+            _held: workspace.reserve("fetched ahead", memory)?,
+            files: self.0.expect(files, memory),
+        })
+    }
+}
+
+/// Files that are fetched before they are read.
+#[derive(Debug)]
+pub(in super::super) struct Expected {
+    files: outcrop_remote::Expected,
+    _held: Reservation,
+}
+
+impl Expected {
+    pub(in super::super) fn take(&self, file: usize) -> std::io::Result<Vec<u8>> {
+        self.files.take(file).map(Into::into)
+    }
+}
+
+/// Memory for what is fetched before it is read: none where tasks share the files, each of which reads parts that are
+/// not known before.
+fn memory_ahead(workspace: &Workspace) -> u64 {
+    match workspace.is_shared() {
+        true => 0,
+        false => AHEAD.min(workspace.memory.available() / SHARE),
     }
 }
 

@@ -43,6 +43,36 @@ impl Remote {
     pub(in super::super) fn fetched(&self) -> Fetched {
         match *self {}
     }
+
+    pub(in super::super) fn beside(&self, _: &Path) -> Result<Beside> {
+        match *self {}
+    }
+}
+
+#[derive(Debug)]
+pub(in super::super) enum Beside {}
+
+impl Beside {
+    pub(in super::super) fn read(&self, _: &str, _: u64) -> std::io::Result<Vec<u8>> {
+        match *self {}
+    }
+
+    pub(in super::super) fn expect(
+        &self,
+        _: Vec<(String, u64)>,
+        _: &Workspace,
+    ) -> Result<Expected> {
+        match *self {}
+    }
+}
+
+#[derive(Debug)]
+pub(in super::super) enum Expected {}
+
+impl Expected {
+    pub(in super::super) fn take(&self, _: usize) -> std::io::Result<Vec<u8>> {
+        match *self {}
+    }
 }
 
 pub(in super::super) fn below(path: &Path) -> Result<Option<Vec<(PathBuf, u64)>>> {
