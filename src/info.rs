@@ -2,12 +2,14 @@
 
 #[cfg(feature = "pages")]
 mod drawing;
+mod headers;
 mod text;
 
 use crate::params::Params;
 use crate::pipeline::Known;
 #[cfg(feature = "pages")]
 pub use drawing::{Illustration, illustrated};
+pub use headers::{Headers, headers};
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::memory::MINIMUM_BUDGET;

@@ -167,6 +167,8 @@ def info(
     *,
     progress: Union[Progress, bool, None] = None,
     html: Optional[Path] = None,
+    headers: bool = False,
+    all_points: bool = False,
     drop_classes: Optional[Classes] = None,
     keep_classes: Optional[Classes] = None,
     columns: Union[str, Sequence[str], None] = None,

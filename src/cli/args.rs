@@ -148,7 +148,7 @@ pub struct Resume {
 /// `outcrop info`
 #[derive(Debug, ClapArgs)]
 pub struct Info {
-    /// Files or folders of files
+    /// Files, folders of files, or URLs
     #[arg(value_name = "INPUT", required = true)]
     pub inputs: Vec<PathBuf>,
     /// Print JSON
@@ -157,6 +157,12 @@ pub struct Info {
     /// Write a page with pictures
     #[arg(long, value_name = "FILE.html")]
     pub html: Option<PathBuf>,
+    /// Only what the headers say, without reading points: the default if an input is a URL
+    #[arg(long, conflicts_with_all = ["html", "all_points"])]
+    pub headers: bool,
+    /// Read all points, also of inputs behind URLs
+    #[arg(long)]
+    pub all_points: bool,
     #[command(flatten)]
     pub points: Points,
     /// Reference system of the cloud, as for reconstruct

@@ -24,7 +24,7 @@
 
 use super::command::{Args, Command};
 use super::{jobs, output};
-use crate::info::Info;
+use crate::info::{Headers, Info};
 use crate::report::{CloseReport, Report, SimplifyReport, TilesReport};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{ArgAction, CommandFactory, Parser};
@@ -49,6 +49,8 @@ pub enum Answer {
     },
     /// Of `info`.
     Info(Box<Info>),
+    /// Of `info`, if only headers are read.
+    Headers(Box<Headers>),
     /// Of `verify`.
     Verdict(Box<Verdict>),
     /// Of `compare`.
@@ -70,6 +72,7 @@ impl Answer {
         match self {
             Self::Mesh { report, .. } => output::json(report),
             Self::Info(info) => output::json(info),
+            Self::Headers(headers) => output::json(headers),
             Self::Verdict(verdict) => output::json(verdict),
             Self::Comparison(comparison) => output::json(comparison),
             Self::Tiles(report) => output::json(report),
@@ -90,6 +93,7 @@ impl Answer {
         match self {
             Self::Mesh { report, output } => output::summary(report, output),
             Self::Info(info) => info.told(spell),
+            Self::Headers(headers) => headers.to_string(),
             Self::Verdict(verdict) => verdict.to_string(),
             Self::Comparison(comparison) => comparison.to_string(),
             Self::Tiles(report) => report.told(spell),
@@ -161,7 +165,10 @@ pub fn run<W: Into<OsString>>(
     Ok(match args.command {
         Command::Reconstruct(args) => mesh(jobs::reconstruct(&args, watch, |_| ())?),
         Command::Resume(args) => mesh(jobs::resume(&args, watch, |_| ())?),
-        Command::Info(args) => Answer::Info(Box::new(jobs::info(&args, watch)?)),
+        Command::Info(args) => match jobs::headers(&args)? {
+            Some(headers) => Answer::Headers(Box::new(headers)),
+            None => Answer::Info(Box::new(jobs::info(&args, watch)?)),
+        },
         Command::Verify(args) => Answer::Verdict(Box::new(jobs::verify(&args, watch)?)),
         Command::Compare(args) => Answer::Comparison(Box::new(jobs::compare(&args, watch)?)),
         Command::Simplify(args) => Answer::Simplify(Box::new(jobs::simplify(&args, watch)?)),

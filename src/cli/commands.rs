@@ -65,6 +65,10 @@ fn tell((report, output): jobs::Made, quiet: Quiet) -> Result<bool> {
 }
 
 fn info(args: &Info) -> Result<bool> {
+    if let Some(headers) = jobs::headers(args)? {
+        show(&headers, args.json)?;
+        return Ok(true);
+    }
     let info = jobs::info(args, stop::watched(args.limits.quiet))?;
     show_told(&info, args.json, |info| info.told(spelled))?;
     Ok(true)

@@ -18,6 +18,7 @@ use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::memory::MemoryPool;
 use outcrop_disk::workspace::progress::{Cancel, Observer};
 use outcrop_inspect::{compare, verify};
+use outcrop_points::is_remote;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -108,6 +109,16 @@ fn run(
         file.write(&text)?;
     }
     Ok((report, run.output().to_path_buf()))
+}
+
+/// The headers of a cloud, if no more is wanted: of files behind URLs nothing else is read, unless that is asked for.
+pub fn headers(args: &Info) -> Result<Option<info::Headers>> {
+    let remote = args.inputs.iter().any(|input| is_remote(input));
+    if !args.headers && (!remote || args.all_points || args.html.is_some()) {
+        return Ok(None);
+    }
+    let layout = args.points.params().selection().layout;
+    info::headers(&args.inputs, &layout).map(Some)
 }
 
 /// Describes a cloud.

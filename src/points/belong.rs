@@ -160,6 +160,7 @@ mod tests {
             path: name.into(),
             format: Format::LAS,
             bytes: 0,
+            fetched: None,
             taken: None,
             guessed: false,
             colors: None,

@@ -7,6 +7,7 @@ use super::formats::{LONG_HEAD, is_cloud};
 use super::input::Input;
 use super::layout::Layout;
 use super::native::Native;
+use super::remote::Fetched;
 use outcrop_disk::error::Result;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -20,6 +21,8 @@ pub struct Probe {
     pub format: Format,
     /// Its size in bytes.
     pub bytes: u64,
+    /// What was asked of the server, if it is on one.
+    pub fetched: Option<Fetched>,
     /// Estimated bytes of its content if it is compressed, else 0.
     pub decompressed_bytes: u64,
     /// Number of points given in the header; `None` for text.
@@ -92,6 +95,7 @@ pub fn probe_as(path: &Path, layout: &Layout) -> Result<Probe> {
     Ok(Probe {
         format: claims.format,
         bytes: input.size,
+        fetched: input.fetched(),
         decompressed_bytes: if input.is_compressed() {
             input.bytes
         } else {

@@ -15,6 +15,7 @@ mod normals;
 mod numbers;
 mod ply_comments;
 mod ply_headers;
+mod point_tiles;
 mod recipe;
 mod regions;
 mod scan_columns;

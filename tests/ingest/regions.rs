@@ -7,7 +7,7 @@ use outcrop_points::{Classes, Crop, Selection, Spool, ingest, ingest_selected};
 use std::io::{Cursor, Seek, SeekFrom};
 use std::path::PathBuf;
 
-fn within(region: &str, margin: f64) -> Selection {
+pub fn within(region: &str, margin: f64) -> Selection {
     let region: Region = region.parse().unwrap();
     Selection {
         classes: Classes::All,
@@ -17,7 +17,7 @@ fn within(region: &str, margin: f64) -> Selection {
 }
 
 /// All points in the cloud's unit, by the bits of their coordinates, sorted.
-fn points(bench: &Bench, spool: &Spool) -> Vec<[u64; 3]> {
+pub fn points(bench: &Bench, spool: &Spool) -> Vec<[u64; 3]> {
     let lattice = spool.choose_lattice(0).unwrap();
     let mut all = Vec::new();
     let add = |points: &[[i32; 3]]| {
@@ -34,7 +34,7 @@ fn points(bench: &Bench, spool: &Spool) -> Vec<[u64; 3]> {
 }
 
 /// Reads a region, and checks that it is what is inside of all points, on the lattice of all points.
-fn check(bench: &Bench, inputs: &[PathBuf], region: &str, margin: f64) -> Spool {
+pub fn check(bench: &Bench, inputs: &[PathBuf], region: &str, margin: f64) -> Spool {
     let selection = within(region, margin);
     let some = ingest_selected(inputs, &selection, &bench.workspace).unwrap();
     let all = ingest(inputs, &bench.workspace).unwrap();

@@ -91,7 +91,7 @@ impl PointFile for Tiles {
 
     fn lies_outside(&self, _: &Input, nearby: &Nearby<'_>, _: &Workspace) -> Option<[[f64; 3]; 2]> {
         let outside = !nearby.may_meet(self.info.cube);
-        outside.then(|| self.kind.in_native(self.info.cube))
+        outside.then(|| self.kind.in_native(self.info.conforming))
     }
 
     fn read(&self, input: &Input, target: &SourceWriter<'_>) -> Result<Vec<String>> {
@@ -99,7 +99,7 @@ impl PointFile for Tiles {
         let found: u64 = nodes.all.iter().map(|node| node.points).sum();
         let left_out = self.info.points.saturating_sub(found);
         if left_out > 0 && target.region().is_some() {
-            target.skip(left_out, self.kind.in_native(self.info.cube));
+            target.skip(left_out, self.kind.in_native(self.info.conforming));
         }
         self.kind.read(input, &self.info, &nodes.all, target)?;
         let mut warnings = Vec::new();

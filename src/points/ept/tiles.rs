@@ -18,7 +18,7 @@ pub(super) enum Kind {
     /// LAZ, with the header of the root's file.
     Laz(Box<Laz>),
     /// Rows of numbers, compressed or not.
-    Rows(Rows),
+    Rows(Box<Rows>),
 }
 
 impl Kind {
@@ -31,7 +31,7 @@ impl Kind {
                 let root = Input::of_memory(input.path.with_file_name(&name), bytes);
                 Ok(Self::Laz(Box::new(Laz::open(&root)?)))
             }
-            Data::Binary | Data::Zstandard => Rows::of(input, info).map(Self::Rows),
+            Data::Binary | Data::Zstandard => Rows::of(input, info).map(Box::new).map(Self::Rows),
         }
     }
 

@@ -69,7 +69,8 @@ pub fn read(bytes: &[u8]) {
     bench.check_memory();
 }
 
-fn split(bytes: &[u8]) -> Vec<&[u8]> {
+/// The parts between separators.
+pub(crate) fn split(bytes: &[u8]) -> Vec<&[u8]> {
     let mut files = Vec::new();
     let mut rest = bytes;
     while let Some(at) = rest.windows(BETWEEN.len()).position(|w| w == BETWEEN) {

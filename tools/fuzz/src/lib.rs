@@ -5,6 +5,7 @@
 
 pub mod cloud;
 pub mod dialect;
+pub mod ept;
 pub mod folder;
 pub mod foreign;
 pub mod mesh;

@@ -52,6 +52,7 @@ pub fn write(folder: &Path) -> Result {
     folders(&seeds)?;
     meshes(&seeds)?;
     foreign_meshes(&seeds)?;
+    scans::tiles(&seeds)?;
     scratch_files(&seeds)?;
     for stage in 0..6u8 {
         for (number, edits) in EDITS.iter().enumerate() {

@@ -1,9 +1,11 @@
-//! Scans: PCD, PTX and E57.
+//! Scans: PCD, PTX, E57 and EPT.
 
 use super::{Result, Seeds};
+use crate::ept;
 use e57::{
     E57Writer, Quaternion, Record, RecordDataType, RecordName, RecordValue, Transform, Translation,
 };
+use outcrop_cloudgen::{Cloud, Format, Kind, LasOptions};
 
 /// PCD with all encodings, other fields and padding.
 pub(super) fn pcd_files(seeds: &Seeds) -> Result {
@@ -114,4 +116,33 @@ fn e57_scan(
         scan.add_point(values.into_iter().chain([state]).collect())?;
     }
     Ok(scan.finalize()?)
+}
+
+/// Sets of tiles of every type, with one node.
+pub(super) fn tiles(seeds: &Seeds) -> Result {
+    let about = |data: &str| {
+        format!(
+            r#"{{"bounds": [0, 0, 0, 9, 9, 9], "dataType": "{data}", "hierarchyType": "json", "points": 9, "schema": [
+            {{"name": "X", "type": "signed", "size": 4, "scale": 0.01, "offset": 0}},
+            {{"name": "Y", "type": "signed", "size": 4, "scale": 0.01, "offset": 0}},
+            {{"name": "Z", "type": "signed", "size": 4, "scale": 0.01, "offset": 0}},
+            {{"name": "Classification", "type": "unsigned", "size": 1}}], "srs": {{"wkt": ""}}, "version": "1.0.0"}}"#
+        )
+    };
+    let rows: Vec<u8> = (0..9 * 13u8)
+        .map(|n| if n % 13 % 4 > 1 { 0 } else { n })
+        .collect();
+    let page = br#"{"0-0-0-0": 9}"#;
+    let packed = zstd::bulk::compress(&rows, 3)?;
+    let folder = tempfile::tempdir()?;
+    let laz = folder.path().join("cloud.laz");
+    Cloud::new(Kind::Sphere)
+        .points(9)
+        .write(&laz, Format::Laz(LasOptions::default()))?;
+    let laz = std::fs::read(laz)?;
+    for (data, file) in [("binary", &rows), ("zstandard", &packed), ("laszip", &laz)] {
+        let bytes = ept::joined([about(data).as_bytes(), page, file]);
+        seeds.put("ept", data, bytes)?;
+    }
+    Ok(())
 }
