@@ -2,10 +2,11 @@
 
 use super::agent::Counts;
 use super::ahead::Ahead;
+use super::answer::Answer;
+use super::errors::told;
 use super::location::Location;
-use super::object::{again, ask, told};
+use super::object::{again, ask};
 use super::stores::{Patience, Place, place};
-use super::whole::Answer;
 use bytes::Bytes;
 use object_store::path::Path;
 use std::io;

@@ -8,8 +8,10 @@
 
 mod agent;
 mod ahead;
+mod answer;
 mod aws;
 mod beside;
+mod errors;
 mod list;
 mod location;
 mod object;

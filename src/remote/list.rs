@@ -1,8 +1,8 @@
 //! The files below a prefix of a store.
 
 use super::agent::Counts;
+use super::errors::told;
 use super::location::Location;
-use super::object::told;
 use super::stores::{Patience, place};
 use super::wait::wait;
 use futures_util::StreamExt;

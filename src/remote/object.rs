@@ -2,13 +2,13 @@
 
 use super::agent::Counts;
 use super::ahead::Ahead;
+use super::answer::Answer;
+use super::errors::{changed, told};
 use super::location::Location;
 use super::stores::{Patience, Place, place};
 use super::wait::wait;
-use super::whole::{Answer, Whole};
 use bytes::Bytes;
-use object_store::{Error, GetOptions, GetRange, GetResult, ObjectStore};
-use std::error::Error as _;
+use object_store::{GetOptions, GetRange, GetResult, ObjectStore};
 use std::io::{self, ErrorKind};
 use std::ops::Range;
 use std::sync::{Arc, PoisonError, RwLock};
@@ -87,22 +87,11 @@ impl Object {
         self.file.size
     }
 
-    /// True if the server sends parts of the file. Else only [`Self::whole`] reads it, and [`Self::read_at`] its
+    /// True if the server sends parts of the file. Else only [`super::Whole`] reads it, and [`Self::read_at`] its
     /// first MiB.
     #[must_use]
     pub fn has_parts(&self) -> bool {
         self.file.has_parts
-    }
-
-    /// A reader of the whole file. If the server sends no parts, an answer that breaks off is an error.
-    ///
-    /// # Errors
-    /// As [`Self::open`].
-    pub fn whole(&self) -> io::Result<Whole<'_>> {
-        match self.has_parts() {
-            true => Ok(Whole::of_parts(self)),
-            false => Ok(Whole::of_stream(self.file.stream()?, self.size())),
-        }
     }
 
     /// The entity tag, which changes with the content; none if the server says none.
@@ -186,7 +175,7 @@ impl Remote {
     }
 
     /// All bytes, as they arrive.
-    fn stream(&self) -> io::Result<Answer> {
+    pub(crate) fn stream(&self) -> io::Result<Answer> {
         Ok(Answer::of(self.ask(None)?))
     }
 
@@ -229,51 +218,4 @@ pub(crate) fn ask(
         ..GetOptions::default()
     };
     wait(store.get_opts(path, options))?.map_err(told)
-}
-
-pub(crate) fn changed() -> io::Error {
-    io::Error::new(
-        ErrorKind::InvalidData,
-        "the file has changed on the server since it was opened",
-    )
-}
-
-/// An error of a store in one line, of the kind that a local file would give.
-pub(crate) fn told(error: Error) -> io::Error {
-    let kind = match &error {
-        Error::NotFound { .. } => ErrorKind::NotFound,
-        Error::PermissionDenied { .. } | Error::Unauthenticated { .. } => {
-            ErrorKind::PermissionDenied
-        }
-        Error::AlreadyExists { .. } => ErrorKind::AlreadyExists,
-        Error::Precondition { .. } => return changed(),
-        Error::NotSupported { .. } | Error::NotImplemented { .. } => ErrorKind::Unsupported,
-        // An empty file has no range.
-        e if e.to_string().contains("416 Range Not Satisfiable") => ErrorKind::Unsupported,
-        _ => ErrorKind::Other,
-    };
-    // The innermost reasons say what happened; the outer ones repeat each other.
-    let mut reasons = vec![error.to_string()];
-    let mut inner = error.source();
-    while let Some(reason) = inner {
-        reasons.push(reason.to_string());
-        inner = reason.source();
-    }
-    let last = reasons.pop().unwrap_or_default();
-    let status = reasons.iter().find_map(|text| status_in(text));
-    let text = match status {
-        Some(status) if !last.contains(&status) => format!("{status}: {last}"),
-        _ => last,
-    };
-    let line: Vec<&str> = text.split_whitespace().collect();
-    io::Error::new(kind, line.join(" "))
-}
-
-/// The status of HTTP in a message, such as `503 Service Unavailable`.
-fn status_in(text: &str) -> Option<String> {
-    let (_, after) = text
-        .split_once("status code: ")
-        .or(text.split_once("status "))?;
-    let end = after.find([':', ',']).unwrap_or(after.len());
-    Some(after[..end].trim().to_owned())
 }

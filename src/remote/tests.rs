@@ -1,6 +1,6 @@
 //! Objects of a server that misbehaves, each in its way.
 
-use super::{Counts, Location, Object};
+use super::{Counts, Location, Object, Whole};
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
@@ -157,7 +157,7 @@ fn what_is_fetched_before_is_asked_for_once() {
     let object = open(&serve(content.clone(), Manner::Good)).unwrap();
     object.expect(std::iter::once(0..object.size()), 16 << 20);
     let mut whole = Vec::new();
-    object.whole().unwrap().read_to_end(&mut whole).unwrap();
+    Whole::of(&object).unwrap().read_to_end(&mut whole).unwrap();
     assert!(whole == content);
     // The first request is for the beginning.
     assert_eq!(object.counts().requests(), 1 + 3);
@@ -183,7 +183,7 @@ fn a_server_without_ranges_sends_whole_files() {
     assert_eq!(object.read_at(&mut head, 0).unwrap(), head.len());
     assert!(head == content[..1 << 20]);
     let mut whole = Vec::new();
-    object.whole().unwrap().read_to_end(&mut whole).unwrap();
+    Whole::of(&object).unwrap().read_to_end(&mut whole).unwrap();
     assert!(whole == content);
 }
 

@@ -269,3 +269,16 @@ pub(super) fn damaged(
 ) -> Error {
     Error::input(input.path.with_file_name(name), "content", found, expected)
 }
+
+/// An error unless a file has the points that the hierarchy says.
+pub(super) fn agrees(input: &Input, name: &str, found: u64, expected: u64) -> Result<()> {
+    match found == expected {
+        true => Ok(()),
+        false => Err(damaged(
+            input,
+            name,
+            format!("{found} points"),
+            &format!("{expected}, as the hierarchy says"),
+        )),
+    }
+}

@@ -6,7 +6,7 @@ use super::super::las::Laz;
 use super::super::native::Native;
 use super::super::spool::{Sink, SourceWriter, sink_bytes};
 use super::hierarchy::Node;
-use super::info::{Data, Info, damaged};
+use super::info::{Data, Info, agrees};
 use super::rows::Rows;
 use outcrop_disk::error::Result;
 
@@ -104,17 +104,4 @@ impl Kind {
 /// The name of a node's file.
 fn name(info: &Info, key: &str) -> String {
     format!("ept-data/{key}.{}", info.data.extension())
-}
-
-/// An error unless a file has the points that the hierarchy says.
-pub(super) fn agrees(input: &Input, name: &str, found: u64, expected: u64) -> Result<()> {
-    match found == expected {
-        true => Ok(()),
-        false => Err(damaged(
-            input,
-            name,
-            format!("{found} points"),
-            &format!("{expected}, as the hierarchy says"),
-        )),
-    }
 }

@@ -5,7 +5,7 @@ use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::compressed::Content;
 use outcrop_disk::workspace::memory::Reservation;
 use outcrop_disk::workspace::{Workspace, lock};
-use outcrop_remote::{Counts, Location, Object};
+use outcrop_remote::{Counts, Location, Object, Whole};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
@@ -74,10 +74,7 @@ impl Remote {
     /// The whole file in the scratch folder.
     pub(in super::super) fn save(&self, path: &Path, workspace: &Workspace) -> Result<Content> {
         self.expect(std::iter::once(0..self.object.size()), workspace)?;
-        let source = self
-            .object
-            .whole()
-            .map_err(|e| Error::io(path, "read", e))?;
+        let source = Whole::of(&self.object).map_err(|e| Error::io(path, "read", e))?;
         Content::saved(path, source, workspace)
     }
 

@@ -1,0 +1,62 @@
+//! Answers as they arrive.
+
+use super::errors::{changed, told};
+use super::wait::wait;
+use bytes::Bytes;
+use futures_util::StreamExt;
+use futures_util::stream::BoxStream;
+use object_store::{Error, GetResult, Result};
+use std::io::{self, ErrorKind};
+
+/// The bytes of an answer, as they arrive.
+pub(crate) struct Answer(BoxStream<'static, Result<Bytes>>);
+
+impl Answer {
+    pub(crate) fn of(got: GetResult) -> Self {
+        Self(got.into_stream())
+    }
+
+    /// The next bytes; none at the end. [`ErrorKind::UnexpectedEof`] if the answer breaks off.
+    pub(crate) fn next(&mut self) -> io::Result<Option<Bytes>> {
+        wait(self.0.next())?.transpose().map_err(broken)
+    }
+
+    /// The first `wanted` bytes, of which there must be as many.
+    pub(crate) fn take(mut self, wanted: u64) -> io::Result<Bytes> {
+        let wanted = usize::try_from(wanted).map_err(io::Error::other)?;
+        let mut all = Vec::new();
+        while all.len() < wanted {
+            let part = self.next()?.ok_or_else(|| {
+                let why = format!("the answer ended after {} of {wanted} bytes", all.len());
+                io::Error::new(ErrorKind::UnexpectedEof, why)
+            })?;
+            let part = &part[..part.len().min(wanted - all.len())];
+            // It grows with what has arrived, not with what a server promises.
+            all.extend_from_slice(part);
+        }
+        Ok(all.into())
+    }
+}
+
+impl Answer {
+    /// All bytes, which may be at most `most`.
+    pub(crate) fn all(mut self, most: u64) -> io::Result<Bytes> {
+        let mut all = Vec::new();
+        while let Some(part) = self.next()? {
+            if part.len() as u64 > most - all.len() as u64 {
+                let why = format!("it is larger than {most} bytes");
+                return Err(io::Error::new(ErrorKind::InvalidData, why));
+            }
+            all.extend_from_slice(&part);
+        }
+        Ok(all.into())
+    }
+}
+
+/// An error in the middle of an answer.
+fn broken(error: Error) -> io::Error {
+    match error {
+        Error::Precondition { .. } => changed(),
+        e => io::Error::new(ErrorKind::UnexpectedEof, told(e).to_string()),
+    }
+}
