@@ -2,6 +2,8 @@
 
 #[path = "view/bench.rs"]
 mod bench;
+#[path = "view/scene.rs"]
+mod scene;
 
 use bench::{Bench, answers, ask, get, raw, root};
 use outcrop::Error;

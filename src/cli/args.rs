@@ -321,9 +321,18 @@ pub struct Compare {
     after_help = "The page is served to browsers on this machine only, until Ctrl-C. Nothing is fetched from elsewhere."
 )]
 pub struct View {
-    /// A folder that `outcrop tiles` made, or a mesh (PLY), of which levels of detail are made first
-    #[arg(value_name = "DIR|MESH.ply")]
+    /// A folder that `outcrop tiles` made, or a mesh (PLY, OBJ, STL or GLB), of which levels of detail are made first
+    #[arg(value_name = "DIR|MESH")]
     pub mesh: PathBuf,
+    /// Another one, shown in the same place: on the other side of a line that can be moved
+    #[arg(value_name = "OTHER")]
+    pub other: Option<PathBuf>,
+    /// Show points of a cloud as well (a file or folder, as of `reconstruct`), spread evenly if there are too many
+    #[arg(long, value_name = "CLOUD")]
+    pub points: Option<PathBuf>,
+    /// Most points that are shown, e.g. 5e6
+    #[arg(long, value_name = "N", default_value = "2000000", requires = "points", value_parser = count)]
+    pub points_limit: u64,
     /// Port of the server [default: a free one]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub port: Option<u16>,
@@ -331,7 +340,7 @@ pub struct View {
     #[arg(long)]
     pub no_browser: bool,
     /// Write one page that shows the coarser levels without a server, for sending, instead of serving
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["port", "no_browser"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["port", "no_browser", "other", "points"])]
     pub html: Option<PathBuf>,
     /// Largest size of that page
     #[arg(long, value_name = "SIZE", default_value = "20MB", requires = "html", value_parser = size)]

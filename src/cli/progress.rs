@@ -107,6 +107,10 @@ impl Bars {
 impl Observer for Bars {
     fn plan(&self, stages: &[Planned]) {
         let mut whole = lock(&self.whole);
+        // Another run of the same command.
+        if whole.outlook.is_over() && whole.bar.is_none() {
+            *whole = Whole::default();
+        }
         whole.outlook.plan(stages);
         if whole.bar.is_none() && stages.iter().any(|stage| stage.seconds > 0.0) {
             let bar = ProgressBar::new(PARTS).with_style(style(WHOLE));

@@ -4,10 +4,12 @@
 //! Every other tile is made from its children: they are joined, simplified (`simplify`) and measured against the
 //! joined surface (`distance`). A vertex that has triangles outside of the tile is not removed, so that tiles of
 //! any two levels meet without a crack. `docs/tiles.md` describes the files. `single` makes one mesh with fewer
-//! triangles instead, from the same cells, and `close` a mesh without a boundary.
+//! triangles instead, from the same cells, and `close` a mesh without a boundary. `cloud` thins points, to be shown
+//! beside a mesh.
 
 mod cells;
 pub mod close;
+pub mod cloud;
 mod columns;
 mod distance;
 mod folder;
@@ -34,6 +36,7 @@ mod writer;
 
 pub use report::{Lossy, Options, TilesReport};
 pub use simplify::{Manner, Quadrics, Simplifier, Surface};
+pub use system::epsg;
 
 use cells::Division;
 use folder::About;

@@ -42,3 +42,13 @@ pub(super) fn of(path: &Path, options: &Options, workspace: &Workspace) -> Resul
         (header, beside) => header.or(beside),
     })
 }
+
+/// The EPSG code of the horizontal system that the header of a mesh, or the `.prj` file beside it, tells.
+///
+/// # Errors
+/// [`outcrop_disk::error::Error::Io`].
+pub fn epsg(path: &Path) -> Result<Option<u32>> {
+    let header = Crs::of_comments(&ply_mesh::system(path)?);
+    let found = header.or_else(|| outcrop_points::of_prj(&outcrop_points::prj_of(path)).0);
+    Ok(found.and_then(|crs| crs.horizontal))
+}

@@ -1,10 +1,12 @@
 //! One connection of the server: requests in, answers out.
 
 use super::assets::{ALL, POLICY};
-use super::folder::{Folder, Opened};
+use super::folder::Opened;
 use super::request::{LONGEST, Refusal, Request, head_length, parse};
+use super::scene::Scene;
 use std::io::{self, Read, Write};
 use std::net::TcpStream;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Time after which a connection without a request ends.
@@ -13,14 +15,14 @@ const IDLE: Duration = Duration::from_secs(30);
 /// Time in which the other side must take what is sent.
 const SLOW: Duration = Duration::from_secs(30);
 
-/// The folder in the URL under which the tileset is.
-const MESH: &str = "mesh";
+/// The name under which the page asks what is shown.
+const SCENE: &str = "scene.json";
 
 /// The files that are served, and the secret of their addresses.
 #[derive(Debug)]
 pub struct Site {
-    /// The folder with the tileset.
-    pub folder: Folder,
+    /// What is shown.
+    pub scene: Arc<Scene>,
     /// The secret part of the URL.
     pub token: String,
     /// The port, as in the header `Host`.
@@ -30,6 +32,7 @@ pub struct Site {
 /// The body of an answer.
 enum Body {
     Bytes(&'static [u8]),
+    Text(String),
     File(Opened),
 }
 
@@ -86,15 +89,12 @@ impl Site {
                 more: format!("Location: /{}/\r\n", self.token),
                 ..Answer::plain("308 Permanent Redirect")
             },
-            [MESH, names @ ..] => {
-                let opened = self.folder.open(names.iter().copied());
-                opened.map_or(absent, |opened| Answer {
-                    status: "200 OK",
-                    kind: opened.kind,
-                    more: String::new(),
-                    body: Body::File(opened),
-                })
-            }
+            [SCENE] => Answer {
+                status: "200 OK",
+                kind: "application/json",
+                more: String::new(),
+                body: Body::Text(self.scene.json().to_string()),
+            },
             [name] => {
                 let asset = ALL.iter().find(|asset| asset.name == *name);
                 asset.map_or(absent, |asset| Answer {
@@ -104,7 +104,15 @@ impl Site {
                     body: Body::Bytes(asset.bytes),
                 })
             }
-            _ => absent,
+            names => {
+                let opened = self.scene.open(names);
+                opened.map_or(absent, |opened| Answer {
+                    status: "200 OK",
+                    kind: opened.kind,
+                    more: String::new(),
+                    body: Body::File(opened),
+                })
+            }
         }
     }
 
@@ -160,6 +168,7 @@ fn next_head(stream: &mut TcpStream, bytes: &mut Vec<u8>) -> io::Result<Option<u
 fn send(stream: &mut TcpStream, answer: Answer, head_only: bool, keep: bool) -> io::Result<()> {
     let length = match &answer.body {
         Body::Bytes(bytes) => bytes.len() as u64,
+        Body::Text(text) => text.len() as u64,
         Body::File(opened) => opened.length,
     };
     let head = format!(
@@ -177,6 +186,7 @@ fn send(stream: &mut TcpStream, answer: Answer, head_only: bool, keep: bool) -> 
     }
     match answer.body {
         Body::Bytes(bytes) => stream.write_all(bytes),
+        Body::Text(text) => stream.write_all(text.as_bytes()),
         Body::File(opened) => {
             let sent = io::copy(&mut opened.file.take(length), stream)?;
             // A file that became shorter: the end of the connection tells the browser.

@@ -1,15 +1,17 @@
 //! The server: threads that answer connections from this machine.
 
 use super::connection::Site;
-use super::folder::Folder;
-use super::tileset::Tileset;
+use super::scene::{Part, Scene};
+use super::watching::Watching;
 use outcrop_disk::error::{Error, Result};
+use outcrop_disk::workspace::progress::Observer;
 use std::collections::HashMap;
 use std::net::{Ipv4Addr, Shutdown, TcpListener, TcpStream};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
 
 /// Most connections at a time; a browser opens six.
 const CONNECTIONS: usize = 64;
@@ -20,7 +22,11 @@ const STACK: usize = 256 << 10;
 /// Bytes of the secret part of the URL.
 const TOKEN: usize = 16;
 
-/// A server that shows a folder of levels of detail to browsers on this machine. It reads only, answers only
+/// Time that a page has to ask why there will be no more, and between two looks whether it has: it asks twice a second.
+const FAREWELL: Duration = Duration::from_millis(1500);
+const LOOK: Duration = Duration::from_millis(20);
+
+/// A server that shows levels of detail to browsers on this machine: of one mesh or two, and of points beside them. It reads only, answers only
 /// those who know the secret in its URL, and ends when it is dropped.
 #[derive(Debug)]
 pub struct Server {
@@ -49,15 +55,28 @@ impl Server {
     /// # Errors
     /// If the folder cannot be read or has no valid tileset, or the port is taken.
     pub fn start(folder: &Path, port: Option<u16>) -> Result<Self> {
-        Tileset::check(folder)?;
-        let folder = Folder::new(folder).map_err(|e| Error::io(folder, "open the folder", e))?;
+        let name = folder.file_name().unwrap_or_default().to_string_lossy();
+        let scene = Scene::new(&[(Part::First, name.into_owned())]);
+        scene.show(Part::First, folder)?;
+        Self::serve(scene, port)
+    }
+
+    /// Serves parts with these names, none of which is there yet: the page waits for them, and shows how far they are.
+    ///
+    /// # Errors
+    /// If the port is taken.
+    pub fn open(parts: &[(Part, String)], port: Option<u16>) -> Result<Self> {
+        Self::serve(Scene::new(parts), port)
+    }
+
+    fn serve(scene: Scene, port: Option<u16>) -> Result<Self> {
         let port = port.unwrap_or(0);
         let failed =
             |e: std::io::Error| Error::io(format!("127.0.0.1:{port}"), "serve the mesh", e);
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(failed)?;
         let bound = listener.local_addr().map_err(failed)?.port();
         let site = Site {
-            folder,
+            scene: Arc::new(scene),
             token: token().map_err(failed)?,
             port: bound,
         };
@@ -75,6 +94,36 @@ impl Server {
             shared,
             listening: Some(listening.map_err(failed)?),
         })
+    }
+
+    /// Shows a part from now on, whose tileset is in this folder. The first mesh comes first: the others are placed
+    /// beside it.
+    ///
+    /// # Errors
+    /// If the folder cannot be read or has no valid tileset, or if nothing tells where it lies beside the first one.
+    pub fn show(&self, part: Part, folder: &Path) -> Result<()> {
+        self.shared.site.scene.show(part, folder)
+    }
+
+    /// An observer of the work on a part, which the page shows; it passes everything on to another one.
+    #[must_use]
+    pub fn observer(&self, part: Part, other: Arc<dyn Observer>) -> Arc<dyn Observer> {
+        Arc::new(Watching {
+            scene: self.shared.site.scene.clone(),
+            part,
+            other,
+        })
+    }
+
+    /// Tells the page why there will be no more, and waits for a moment until it knows.
+    pub fn fail(&self, why: &str) {
+        let scene = &self.shared.site.scene;
+        let since = Instant::now();
+        if scene.fail(why) {
+            while !scene.is_told() && since.elapsed() < FAREWELL {
+                thread::sleep(LOOK);
+            }
+        }
     }
 
     /// The URL of the page, with the secret.

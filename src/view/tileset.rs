@@ -5,7 +5,7 @@ use serde::de::{DeserializeOwned, IgnoredAny};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::io::{BufReader, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Name of the file in its folder.
 pub const NAME: &str = "tileset.json";
@@ -63,6 +63,8 @@ pub struct Content {
 struct Outline {
     asset: Version,
     root: Branch,
+    #[serde(default)]
+    extras: Value,
 }
 
 #[derive(Deserialize)]
@@ -78,12 +80,28 @@ struct Branch {
     _content: Option<Uri>,
     #[serde(default)]
     children: Vec<Branch>,
+    transform: Option<Box<[f64; 16]>>,
 }
 
 #[derive(Deserialize)]
 struct Uri {
     #[serde(rename = "uri")]
     _uri: IgnoredAny,
+}
+
+/// What tells where a tileset lies.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Facts {
+    /// Its `tileset.json`.
+    pub path: PathBuf,
+    /// True if this program made it: its coordinates are those of the scan less the origin.
+    pub is_ours: bool,
+    /// The origin of its coordinates.
+    pub origin: [f64; 3],
+    /// EPSG code of its reference system.
+    pub epsg: Option<u64>,
+    /// The map from its coordinates to the globe, by columns.
+    pub transform: Option<Box<[f64; 16]>>,
 }
 
 impl Branch {
@@ -124,14 +142,53 @@ fn read<T: DeserializeOwned>(folder: &Path) -> Result<T> {
     })
 }
 
+/// A tileset, or a mesh of which one is made later.
+#[derive(Debug, Clone, Copy)]
+pub enum Place<'a> {
+    /// The folder of a tileset.
+    Folder(&'a Path),
+    /// A mesh, and the EPSG code of its reference system, if that is known.
+    Mesh(&'a Path, Option<u32>),
+}
+
+impl Place<'_> {
+    fn facts(&self) -> Result<Facts> {
+        match *self {
+            Self::Folder(folder) => Tileset::check(folder),
+            Self::Mesh(path, epsg) => Ok(Facts {
+                path: path.to_path_buf(),
+                is_ours: true,
+                origin: [0.0; 3],
+                epsg: epsg.map(u64::from),
+                transform: None,
+            }),
+        }
+    }
+}
+
+/// An error unless all tilesets are valid, and all places can be shown together, as far as that is known.
+///
+/// # Errors
+/// [`Error::Input`], [`Error::Io`].
+pub fn check(places: &[Place<'_>]) -> Result<()> {
+    let facts = places.iter().map(Place::facts);
+    match &facts.collect::<Result<Vec<Facts>>>()?[..] {
+        [first, others @ ..] => others
+            .iter()
+            .try_for_each(|other| other.beside(first).map(|_| ())),
+        [] => Ok(()),
+    }
+}
+
 impl Tileset {
     /// Reads the tileset of a folder. It takes some ten times its length of memory.
     pub fn open(folder: &Path) -> Result<Self> {
         read(folder)
     }
 
-    /// An error if the folder has no valid tileset; less memory is taken than the file is long.
-    pub fn check(folder: &Path) -> Result<()> {
+    /// Where the tileset of a folder lies. An error if the folder has no valid one; less memory is taken than the file
+    /// is long.
+    pub fn check(folder: &Path) -> Result<Facts> {
         let outline: Outline = read(folder)?;
         let invalid = |place: &str, found: String, expected: &str| {
             Err(Error::input(folder.join(NAME), place, found, expected))
@@ -147,7 +204,15 @@ impl Tileset {
                 "errors of at least 0",
             );
         }
-        Ok(())
+        let noted = &outline.extras["outcrop"];
+        let origin = serde_json::from_value(noted["origin"].clone()).ok();
+        Ok(Facts {
+            path: folder.join(NAME),
+            is_ours: origin.is_some(),
+            origin: origin.unwrap_or_default(),
+            epsg: noted["epsg"].as_u64(),
+            transform: outline.root.transform,
+        })
     }
 
     /// A property of the mesh that `outcrop tiles` notes, by its name in `extras.outcrop`.

@@ -2,6 +2,7 @@
 
 mod checks;
 mod closed;
+mod cloud;
 mod globe;
 mod lossy;
 mod meshes;

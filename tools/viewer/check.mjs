@@ -1,27 +1,17 @@
 // Looks at a mesh in a real browser: called by scripts/check-view with the program, the renderer, the browser, and
 // a folder that has mesh.ply. Numbers and pictures are compared with the mesh file and with tools/render.
 
-import { execFileSync, spawn } from 'node:child_process';
+import { execFileSync } from 'node:child_process';
 import { cpSync, readFileSync, readdirSync, rmSync, writeFileSync } from 'node:fs';
-import { createRequire } from 'node:module';
 import { join } from 'node:path';
+import { first, two } from './check-two.mjs';
+import { begin, check, end, open, passed, serve, SIZE, vertices } from './look.mjs';
 import { Pace } from './src/pace.js';
 
 const [ outcrop, render, chromium, modules, folder ] = process.argv.slice( 2 );
-const { chromium: driver } = createRequire( join( modules, 'x.js' ) )( 'playwright-core' );
-const SIZE = { width: 900, height: 700 };
-const PATIENCE = 240000;
 const HALF = Math.tan( 45 / 2 * Math.PI / 180 );
-let passed = 0;
 
-function check( what, fine, found = '' ) {
-
-	if ( ! fine ) throw new Error( `${ what }: ${ typeof found === 'string' ? found : JSON.stringify( found ) }` );
-	passed ++;
-	console.log( `  ${ what }${ found === '' ? '' : `: ${ typeof found === 'string' ? found : JSON.stringify( found ) }` }` );
-
-}
-
+await begin( outcrop, chromium, modules );
 /** The pace by itself: pictures that take long make it coarser, short ones finer, and a view at rest has all detail. */
 function paces() {
 
@@ -57,34 +47,6 @@ function paces() {
 
 }
 
-/** Vertices of a binary PLY with doubles first, and the place of other properties of a byte. */
-function vertices( path ) {
-
-	const bytes = readFileSync( path ), end = bytes.indexOf( 'end_header\n' ) + 11;
-	const lines = bytes.subarray( 0, end ).toString( 'latin1' ).split( '\n' );
-	const count = Number( lines.find( line => line.startsWith( 'element vertex' ) ).split( ' ' )[ 2 ] );
-	const sizes = { double: 8, float: 4, uchar: 1, ushort: 2, int: 4 };
-	const face = lines.findIndex( line => line.startsWith( 'element face' ) );
-	const properties = lines.slice( 0, face ).filter( line => line.startsWith( 'property' ) ).map( line => line.split( ' ' ) );
-	const stride = properties.reduce( ( sum, [ , type ] ) => sum + sizes[ type ], 0 );
-	let at = 0;
-	const places = {};
-	for ( const [ , type, name ] of properties ) {
-
-		places[ name ] = at;
-		at += sizes[ type ];
-
-	}
-
-	return Array.from( { length: count }, ( _, n ) => {
-
-		const from = end + n * stride;
-		return { at: [ 0, 8, 16 ].map( k => bytes.readDoubleLE( from + k ) ), color: [ 'red', 'green', 'blue' ].map( name => bytes[ from + places[ name ] ] ) };
-
-	} );
-
-}
-
 /** The camera of tools/render, without its cropping. */
 function cameraOf( points, azimuth, elevation ) {
 
@@ -108,51 +70,6 @@ function cameraOf( points, azimuth, elevation ) {
 	const middle = spans.map( ( [ low, high ] ) => ( low + high ) / 2 );
 	const scale = Math.min( 0.9 * SIZE.width / ( spans[ 0 ][ 1 ] - spans[ 0 ][ 0 ] ), 0.9 * SIZE.height / ( spans[ 1 ][ 1 ] - spans[ 1 ][ 0 ] ) );
 	return { center: [ 0, 1, 2 ].map( k => right[ k ] * middle[ 0 ] + up[ k ] * middle[ 1 ] + towards[ k ] * middle[ 2 ] ), yaw: a + Math.PI, pitch: - e, distance: SIZE.height / scale / 2 / HALF };
-
-}
-
-/** Programs that were started; a failed check leaves some running. */
-const children = [];
-
-/** A running `outcrop view`, and its URL. */
-async function serve( ...args ) {
-
-	const child = spawn( outcrop, [ 'view', '--no-browser', '--quiet', ...args ], { stdio: [ 'ignore', 'pipe', 'inherit' ] } );
-	children.push( child );
-	const url = await new Promise( ( resolve, reject ) => {
-
-		let text = '';
-		child.stdout.on( 'data', part => ( text += part ).includes( '\n' ) && resolve( text.trim() ) );
-		child.on( 'exit', code => reject( new Error( `outcrop view ended with ${ code }` ) ) );
-
-	} );
-	return { url, stop: signal => new Promise( resolve => { child.on( 'exit', ( code, by ) => resolve( code ?? by ) ); child.kill( signal ); } ) };
-
-}
-
-const browser = await driver.launch( { executablePath: chromium, args: [
-	'--headless', '--no-sandbox', '--enable-unsafe-swiftshader', '--use-angle=swiftshader', '--disable-quic', '--no-first-run',
-	'--disable-background-networking', '--disable-component-update', '--disable-sync',
-] } );
-
-/** A page with all that it asked for, and all that went wrong. */
-async function open( url ) {
-
-	const page = await browser.newPage( { viewport: SIZE } );
-	const asked = [], errors = [];
-	page.on( 'request', request => asked.push( request.url() ) );
-	page.on( 'console', message => [ 'error', 'warning' ].includes( message.type() ) && ! /GPU stall|swiftshader/i.test( message.text() ) && errors.push( message.text() ) );
-	page.on( 'pageerror', error => errors.push( String( error ) ) );
-	await page.goto( url );
-	const settled = async () => {
-
-		await page.waitForFunction( () => window.outcropViewer?.settled, null, { timeout: PATIENCE } );
-		await page.waitForTimeout( 350 );
-		await page.waitForFunction( () => window.outcropViewer.settled, null, { timeout: PATIENCE } );
-
-	};
-	await settled();
-	return { page, asked, errors, settled };
 
 }
 
@@ -448,10 +365,12 @@ async function main() {
 
 }
 
-main().then( () => console.log( `check-view: ${ passed } checks` ), error => { console.error( `check-view: ${ error.message }` ); process.exitCode = 1; } )
-	.finally( () => {
+async function all() {
 
-		for ( const child of children ) child.kill( 'SIGKILL' );
-		return browser.close();
+	await main();
+	await first( folder );
+	await two( folder );
 
-	} );
+}
+
+all().then( () => console.log( `check-view: ${ passed() } checks` ), error => { console.error( `check-view: ${ error.message }` ); process.exitCode = 1; } ).finally( end );

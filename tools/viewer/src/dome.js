@@ -57,8 +57,8 @@ export class Dome {
 
 	}
 
-	/** Draws a scene; `height` is that of the view at its focus. */
-	draw( scene, camera, height ) {
+	/** Draws what `paint` draws into a target; `height` is that of the view at its focus. */
+	draw( paint, camera, height ) {
 
 		const { renderer, target, material: { uniforms: u } } = this;
 		const size = renderer.getDrawingBufferSize( new Vector2() );
@@ -69,9 +69,7 @@ export class Dome {
 		u.uFar.value = camera.far;
 		u.uScale.value = height;
 		u.uParallel.value = camera.isOrthographicCamera ? 1 : 0;
-		renderer.setRenderTarget( target );
-		renderer.clear();
-		renderer.render( scene, camera );
+		paint( target );
 		renderer.setRenderTarget( null );
 		renderer.render( this.scene, this.camera );
 

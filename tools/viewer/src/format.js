@@ -19,6 +19,14 @@ export const mib = bytes => bytes >= 2 ** 30 ? `${ ( bytes / 2 ** 30 ).toFixed( 
 /** A number with at most so many decimals, without zeros at the end. */
 export const plain = ( x, decimals ) => String( Number( x.toFixed( Math.min( decimals, 15 ) ) ) );
 
+/** Number of decimals of a lattice step. */
+export function decimals( step ) {
+
+	for ( let n = 0; n < 12; n ++ ) if ( Math.abs( step * 10 ** n - Math.round( step * 10 ** n ) ) < 1e-9 * 10 ** n * step ) return n;
+	return 12;
+
+}
+
 /** An element with its content. */
 export function make( name, properties = {}, ...children ) {
 

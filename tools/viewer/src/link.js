@@ -3,7 +3,7 @@
 import { Vector3 } from 'three';
 
 /** The view as text. */
-export function write( { navigator, mesh, section, settings } ) {
+export function write( { navigator, mesh, section, settings, split } ) {
 
 	const { focus, distance, yaw, pitch, orthographic } = navigator.state();
 	const digits = Math.max( 0, Math.min( 9, 4 - Math.floor( Math.log10( distance ) ) ) );
@@ -14,9 +14,28 @@ export function write( { navigator, mesh, section, settings } ) {
 		look: [ degrees( yaw ), degrees( pitch ) ].join(),
 		...( orthographic ? { parallel: 1 } : {} ),
 		...( settings.color === 'plain' ? {} : { color: settings.color } ),
+		...( split.two ? { show: split.mode === 'split' ? `split,${ Number( split.at.toFixed( 3 ) ) }` : split.mode } : {} ),
+		...( mesh.cloud.info ? { points: mesh.cloud.on ? [ mesh.cloud.size, mesh.cloud.color ].join() : 'off' } : {} ),
 		...( section.axis ? { cut: [ section.axis, ( section.at + mesh.info.origin[ 'xyz'.indexOf( section.axis ) ] ).toFixed( digits ), section.side ].join() } : {} ),
 	};
 	return '#' + Object.entries( parts ).map( ( [ key, value ] ) => `${ key }=${ encodeURIComponent( value ).replaceAll( '%2C', ',' ).replaceAll( '%3A', ':' ) }` ).join( '&' );
+
+}
+
+/** What a text tells of the line between two meshes, and of points. Whatever is not valid is left out. */
+export function readShown( hash ) {
+
+	const parts = new URLSearchParams( hash.replace( /^#/, '' ) );
+	const [ mode, at ] = ( parts.get( 'show' ) ?? '' ).split( ',' ), [ size, color ] = ( parts.get( 'points' ) ?? '' ).split( ',' );
+	const part = at === undefined || at.trim() === '' ? NaN : Number( at );
+	return {
+		mode, at: part >= 0 && part <= 1 ? part : null,
+		points: {
+			...( size === 'off' ? { on: false } : {} ),
+			...( Number( size ) >= 1 && Number( size ) <= 12 ? { size: Number( size ) } : {} ),
+			...( [ 'color', 'plain' ].includes( color ) ? { color } : {} ),
+		},
+	};
 
 }
 

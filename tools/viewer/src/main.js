@@ -1,15 +1,19 @@
 // The page: puts the parts together, and draws when something has changed.
 
-import { ColorManagement, LinearSRGBColorSpace, Matrix4, Raycaster, Scene, Vector2, Vector3, WebGLRenderer } from 'three';
+import { ColorManagement, LinearSRGBColorSpace, Matrix4, Scene, WebGLRenderer } from 'three';
 import { Dome } from './dome.js';
 import { drawAxes, Marks, roundLength } from './marks.js';
 import * as link from './link.js';
 import { shared } from './material.js';
-import { MeshView } from './mesh.js';
 import { Navigator } from './navigator.js';
 import { Fence, Pace, SLOW } from './pace.js';
 import { Panel } from './panel.js';
+import { Picker } from './picker.js';
+import { Progress } from './progress.js';
+import { watch } from './scene.js';
 import { Section } from './section.js';
+import { Split } from './split.js';
+import { World } from './world.js';
 
 // Colours are as on the screen, from file to canvas.
 ColorManagement.enabled = false;
@@ -25,35 +29,39 @@ function start() {
 	const sharp = Math.min( devicePixelRatio, 2 );
 	renderer.setPixelRatio( sharp );
 	const scene = new Scene(), dome = new Dome( renderer ), marks = new Marks(), section = new Section();
-	const raycaster = new Raycaster(), pace = new Pace(), fence = new Fence( renderer.getContext() );
-	let dirty = true, measuring = false, measured = [], ready = false, frame = 0;
+	const pace = new Pace(), fence = new Fence( renderer.getContext() );
+	const progress = new Progress();
+	let dirty = true, ready = false, frame = 0, coming = null, fitted = null;
 	const changed = () => dirty = true;
+	const split = new Split( changed );
 
 	const navigator = new Navigator( canvas, {
-		pick: ( x, y ) => hit( x, y )?.point ?? null,
-		bounds: () => ready ? mesh : { sphere: { center: new Vector3(), radius: 1 }, box: { min: new Vector3( - 1, - 1, - 1 ), max: new Vector3( 1, 1, 1 ) } },
+		pick: ( x, y ) => ready ? picker.hit( x, y )?.point ?? null : null,
+		bounds: () => mesh,
 		changed,
-		clicked: ( x, y ) => click( x, y ),
+		clicked: ( x, y ) => ready && picker.click( x, y ),
 	} );
-	const mesh = new MeshView( renderer, navigator.camera, { changed, failed, opened } );
-	mesh.tiles.group.matrixAutoUpdate = true;
-	scene.add( mesh.tiles.group );
+	const mesh = new World( renderer, navigator.camera, scene, { changed, failed, opened } );
+	const picker = new Picker( { canvas, world: mesh, navigator, section, split, marks, changed } );
+	/** The meshes that are in the picture. */
+	const pictured = () => split.shown( mesh.open );
 
 	// What can be done.
 
 	const actions = {
 		fit: () => navigator.fit(),
 		view: name => navigator.view( name ),
-		parallel() { navigator.go( { orthographic: ! navigator.orthographic } ); mesh.use( navigator.camera, renderer ); show(); },
+		parallel() { navigator.go( { orthographic: ! navigator.orthographic } ); mesh.use( navigator.camera ); show(); },
 		fly() { navigator.flying = ! navigator.flying; show(); },
-		measure() { measuring = ! measuring; clear(); show(); },
+		measure() { picker.measuring = ! picker.measuring; picker.clear(); show(); },
 		link() { remember(); panel.copy( location.href ); },
 		theme() { theme( document.documentElement.dataset.theme === 'dark' ? 'light' : 'dark' ); },
 		color( mode ) { settings.color = mode; mesh.colorBy( mode ); panel.legend( mode, mesh ); show(); remember(); },
 		range( low, high ) { mesh.setRange( settings.color, low, high ); panel.legend( settings.color, mesh ); },
 		toggle( name, on ) { settings[ name ] = on; apply(); },
-		detail( pixels ) { settings.detail = mesh.detail = pixels; changed(); },
-		budget( mib ) { settings.budget = mesh.budget = mib; },
+		detail( detail ) { settings.detail = detail; mesh.set( { detail } ); },
+		budget( budget ) { settings.budget = budget; mesh.set( { budget } ); },
+		points( change ) { mesh.cloud.set( change ); show(); },
 		section( axis ) {
 
 			if ( axis && axis !== section.axis ) section.at = ( mesh.box.min[ axis ] + mesh.box.max[ axis ] ) / 2;
@@ -65,15 +73,14 @@ function start() {
 		sectionAt( part ) { const { min, max } = mesh.box, a = section.axis; section.at = min[ a ] + part * ( max[ a ] - min[ a ] ); show(); changed(); },
 		sectionFlip() { section.side = - section.side; show(); changed(); },
 	};
-	const panel = new Panel( actions );
-	const show = () => ready && panel.settings( { settings, navigator, section, mesh, measuring } );
+	const panel = picker.panel = new Panel( actions );
+	const show = () => ready && panel.settings( { settings, navigator, section, mesh, measuring: picker.measuring } );
 
 	function apply() {
 
 		shared.uFlat.value = Number( settings.flat );
 		shared.uBacks.value = Number( settings.backs );
-		mesh.showWires = settings.wire;
-		mesh.showEdges = settings.boundary;
+		mesh.set( { wires: settings.wire, edges: settings.boundary } );
 		show();
 		changed();
 
@@ -88,39 +95,98 @@ function start() {
 
 	}
 
-	// The mesh comes.
+	// Meshes and points come.
 
-	function opened( info ) {
+	/** Names of the properties that colours can show, and what they are called. */
+	function modes() {
 
-		ready = true;
-		const columns = info.columns.map( c => c.name ).filter( name => ! [ 'red', 'green', 'blue', 'nx', 'ny', 'nz' ].includes( name ) );
-		const colored = info.columns.some( c => c.name === 'red' );
-		const modes = [ [ 'plain', 'One colour' ], ...( colored ? [ [ 'color', 'Scan colour' ] ] : [] ), [ 'height', 'Height' ],
+		const columns = mesh.columns.filter( name => ! [ 'red', 'green', 'blue', 'nx', 'ny', 'nz' ].includes( name ) );
+		return [ [ 'plain', 'One colour' ], ...( mesh.open.some( one => one.hasColors ) ? [ [ 'color', 'Scan colour' ] ] : [] ), [ 'height', 'Height' ],
 			...columns.map( name => [ `column:${ name }`, name[ 0 ].toUpperCase() + name.slice( 1 ).replaceAll( '_', ' ' ) ] ), [ 'tile', 'Tile' ], [ 'level', 'Level of detail' ] ];
-		panel.opened( info, modes );
-		actions.modes = modes.map( ( [ mode ] ) => mode );
-		settings.color = colored ? 'color' : 'plain';
-		if ( ! restore() ) navigator.view( 'oblique', false );
-		apply();
-		const first = () => {
-
-			mesh.tiles.removeEventListener( 'load-model', first );
-			actions.color( settings.color );
-			panel.loaded();
-
-		};
-		mesh.tiles.addEventListener( 'load-model', first );
 
 	}
 
-	function failed( name, why ) {
+	/** The tree of a mesh is there, or, without one, the points are. */
+	function opened( one ) {
 
-		if ( ! name ) panel.failed( why );
+		if ( one ) {
+
+			const all = modes();
+			actions.modes = all.map( ( [ mode ] ) => mode );
+			panel.opened( mesh, all );
+			mesh.colorBy( settings.color );
+			const first = () => {
+
+				one.tiles.removeEventListener( 'load-model', first );
+				actions.color( settings.color );
+				panel.loaded();
+
+			};
+			one.tiles.addEventListener( 'load-model', first );
+
+		} else panel.points( mesh.cloud.info );
+		if ( one === mesh.first ) {
+
+			ready = true;
+			settings.color = one.hasColors ? 'color' : 'plain';
+			if ( ! restore() ) fit();
+			apply();
+
+		} else if ( fitted === JSON.stringify( navigator.state() ) ) fit();
+		show();
+		changed();
+
+	}
+
+	/** Shows all that is there by now. */
+	function fit() {
+
+		navigator.view( 'oblique', false );
+		fitted = JSON.stringify( navigator.state() );
+
+	}
+
+	watch( {
+		known( all ) {
+
+			const meshes = all.filter( part => part.kind === 'mesh' );
+			if ( meshes.length > 1 ) split.name( meshes.map( part => part.name ) );
+			const { mode, at, points } = link.readShown( location.hash );
+			split.set( mode );
+			if ( at !== null ) split.move( at );
+			mesh.cloud.set( points );
+
+		},
+		ready( part ) {
+
+			if ( ! mesh.first ) panel.loading( null );
+			mesh.add( part );
+
+		},
+		coming( others ) {
+
+			coming = others;
+			if ( ! mesh.first && others.length ) panel.loading( others.find( part => part.state === 'making' ) ?? others[ 0 ] );
+
+		},
+		failed( text ) {
+
+			coming = [];
+			if ( ready ) panel.message( 'ended', text );
+			else panel.failed( text );
+
+		},
+	} );
+
+	function failed( one, name, why ) {
+
+		if ( ! one ) panel.message( 'points', `${ name }: ${ why }.` );
+		else if ( ! name ) one === mesh.first ? panel.failed( why ) : panel.message( 'second', why );
 		else {
 
-			if ( mesh.missing.size && ! mesh.tiles.visibleTiles.size && mesh.missing.has( mesh.tiles.root ) ) panel.failed( `${ name } cannot be loaded; ${ why }.` );
-			const more = mesh.missing.size > 1 ? ` (${ mesh.missing.size } tiles in all)` : '';
-			panel.message( 'missing', `Tile ${ name } cannot be loaded${ more }; ${ why }.`, { action: { text: 'Try again', act: () => mesh.retry() } } );
+			if ( one === mesh.first && one.missing.size && ! one.tiles.visibleTiles.size && one.missing.has( one.tiles.root ) ) panel.failed( `${ name } cannot be loaded; ${ why }.` );
+			const more = one.missing.size > 1 ? ` (${ one.missing.size } tiles in all)` : '';
+			panel.message( 'missing', `Tile ${ name } cannot be loaded${ more }; ${ why }.`, { action: { text: 'Try again', act: () => one.retry() } } );
 
 		}
 
@@ -133,7 +199,7 @@ function start() {
 		const view = link.read( location.hash, mesh );
 		if ( ! view ) return false;
 		navigator.go( view.camera );
-		mesh.use( navigator.camera, renderer );
+		mesh.use( navigator.camera );
 		if ( view.section ) Object.assign( section, view.section );
 		if ( actions.modes.includes( view.color ) ) settings.color = view.color;
 		return true;
@@ -144,96 +210,23 @@ function start() {
 	function remember() {
 
 		if ( ! ready ) return;
-		written = link.write( { navigator, mesh, section, settings } );
+		written = link.write( { navigator, mesh, section, settings, split } );
 		if ( written !== location.hash ) history.replaceState( null, '', written );
 
 	}
 
 	addEventListener( 'hashchange', () => ready && location.hash !== written && restore() && actions.color( settings.color ) );
 
-	// Points.
-
-	/** The nearest shown point of the mesh at a pixel. */
-	function hit( x, y ) {
-
-		if ( ! ready ) return null;
-		navigator.apply();
-		raycaster.setFromCamera( new Vector2( 2 * x / canvas.clientWidth - 1, 1 - 2 * y / canvas.clientHeight ), navigator.camera );
-		if ( navigator.orthographic ) raycaster.ray.origin.addScaledVector( raycaster.ray.direction, - 4 * mesh.sphere.radius );
-		return raycaster.intersectObject( mesh.tiles.group ).find( found => found.face && section.shows( found.point ) ) ?? null;
-
-	}
-
-	/** The corner of the triangle at a pixel that is nearest to it. */
-	function vertexAt( x, y ) {
-
-		const found = hit( x, y );
-		if ( ! found ) return null;
-		const { a, b, c } = found.face;
-		const corners = [ a, b, c ].map( index => mesh.vertex( found.object, index ) );
-		return corners.sort( ( p, q ) => p.local.distanceTo( found.point ) - q.local.distanceTo( found.point ) )[ 0 ];
-
-	}
-
-	function clear() {
-
-		measured = [];
-		marks.set( [] );
-		panel.noResult();
-		changed();
-
-	}
-
-	function click( x, y ) {
-
-		const vertex = vertexAt( x, y );
-		if ( measuring ) {
-
-			if ( vertex ) measure( vertex );
-			return;
-
-		}
-
-		if ( ! vertex ) return clear();
-		marks.set( [ vertex.local ] );
-		const note = mesh.info.exact === false ? 'Rounded: the mesh has finer coordinates than its levels of detail.' : vertex.level > 0 ? 'A vertex of the mesh; there may be nearer ones in finer levels.' : '';
-		panel.result( 'Vertex', [ ...vertex.text.map( ( text, k ) => [ 'XYZ'[ k ], text ] ), ...vertex.values ], { text: vertex.text.join( ' ' ), note, close: clear } );
-		changed();
-
-	}
-
-	/** Lengths between points: in space, on the ground, in height. */
-	function lengths( points ) {
-
-		const pairs = points.slice( 1 ).map( ( point, n ) => [ points[ n ], point ] );
-		const sum = of => pairs.reduce( ( total, [ a, b ] ) => total + of( b.local.clone().sub( a.local ) ), 0 );
-		return { each: pairs.map( ( [ a, b ] ) => a.local.distanceTo( b.local ) ), all: sum( d => d.length() ), flat: sum( d => Math.hypot( d.x, d.y ) ), rise: sum( d => d.z ) };
-
-	}
-
-	function measure( vertex ) {
-
-		measured.push( vertex );
-		const digits = Math.min( Math.max( mesh.decimals, 2 ), 6 ), { each, all, flat, rise } = lengths( measured );
-		marks.set( measured.map( v => v.local ), each.map( x => x.toFixed( digits ) ) );
-		const rows = [ [ 'Distance', all.toFixed( digits ) ], [ 'On the ground', flat.toFixed( digits ) ], [ 'Height', rise.toFixed( digits ) ] ];
-		if ( measured.length > 2 ) rows.push( [ 'Parts', each.length ] );
-		panel.result( 'Distance', measured.length > 1 ? rows : [ [ 'From', vertex.text.join( '  ' ) ] ], {
-			text: measured.length > 1 ? all.toFixed( digits ) : null, note: measured.length > 1 ? 'Between vertices. Another click adds a part.' : 'Click the next point.', close: clear,
-		} );
-		changed();
-
-	}
-
 	// Keys.
 
 	const KEYS = {
 		f: actions.fit, 0: () => actions.view( 'oblique' ), 1: () => actions.view( 'top' ), 2: () => actions.view( 'front' ), 3: () => actions.view( 'right' ),
 		4: () => actions.view( 'left' ), 5: () => actions.view( 'back' ), 6: () => actions.view( 'bottom' ),
-		o: actions.parallel, g: actions.fly, m: actions.measure, l: actions.link, n: actions.theme, '?': () => panel.help(), h: () => panel.help(),
+		o: actions.parallel, g: actions.fly, m: actions.measure, l: actions.link, n: actions.theme, v: () => split.next(), '[': () => split.nudge( - 1 ), ']': () => split.nudge( 1 ),
+		p: () => actions.points( { on: ! mesh.cloud.on } ), '?': () => panel.help(), h: () => panel.help(),
 		c: () => actions.color( actions.modes[ ( actions.modes.indexOf( settings.color ) + 1 ) % actions.modes.length ] ),
 		...Object.fromEntries( [ [ 'e', 'edl' ], [ 't', 'flat' ], [ 'k', 'backs' ], [ 'x', 'wire' ], [ 'b', 'boundary' ] ].map( ( [ key, name ] ) => [ key, () => actions.toggle( name, ! settings[ name ] ) ] ) ),
-		escape() { if ( measuring && measured.length === 0 ) measuring = false; if ( navigator.flying ) navigator.flying = false; clear(); show(); },
+		escape() { if ( picker.measuring && picker.isEmpty ) picker.measuring = false; if ( navigator.flying ) navigator.flying = false; picker.clear(); show(); },
 	};
 	addEventListener( 'keydown', event => {
 
@@ -273,7 +266,7 @@ function start() {
 
 		navigator.apply();
 		if ( moved() ) pace.moved( now );
-		mesh.update( navigator.camera, renderer, pace.coarser( now ) );
+		mesh.update( navigator.camera, pace.coarser( now ) );
 
 	}
 
@@ -282,8 +275,10 @@ function start() {
 		const ratio = sharp * pace.pixels( now );
 		if ( renderer.getPixelRatio() !== ratio ) renderer.setPixelRatio( ratio );
 		section.apply( navigator.camera );
-		if ( settings.edl ) dome.draw( scene, navigator.camera, navigator.viewHeight() );
-		else renderer.render( scene, navigator.camera );
+		mesh.cloud.apply( ratio );
+		const paint = target => split.paint( renderer, target, scene, navigator.camera, mesh.open );
+		if ( settings.edl ) dome.draw( paint, navigator.camera, navigator.viewHeight() );
+		else paint( null );
 		marks.draw( navigator.camera, width, height );
 		drawAxes( document.getElementById( 'axes' ), navigator );
 		const pixel = navigator.pixel(), length = roundLength( 130 * pixel );
@@ -312,7 +307,7 @@ function start() {
 		if ( paced && ! pace.moves( now ) ) changed();
 		// The renderer of tiles wants some frames after the last change, until nothing is on its way.
 		if ( dirty || moves ) busy = 3;
-		const loading = ! ready || mesh.tiles.isLoading;
+		const loading = ! ready || mesh.isLoading;
 		if ( busy > 0 || loading ) {
 
 			busy --;
@@ -335,8 +330,9 @@ function start() {
 	setInterval( () => {
 
 		if ( ! ready ) return;
-		const stats = mesh.stats(), moves = pace.moves( performance.now() );
-		panel.stats( { ...stats, coarser: Math.max( stats.coarser, pace.coarser( performance.now() ) ) }, mesh.info, milliseconds );
+		const now = performance.now(), stats = mesh.stats( pictured() ), moves = pace.moves( now );
+		panel.stats( { ...stats, coarser: Math.max( stats.coarser, pace.coarser( now ) ) }, pictured(), milliseconds );
+		progress.show( coming ?? [], stats.loading, mesh.cloud.loading, now );
 		// While the view moves, the pace decides. One change for each picture, which shows what it did.
 		if ( ! moves && frame !== limited ) mesh.limit( stats.triangles );
 		limited = frame;
@@ -347,8 +343,7 @@ function start() {
 
 		if ( ! pointer || ! ready || performance.now() - pointer.at < 60 || pointer.told ) return;
 		pointer.told = true;
-		const found = hit( pointer.x, pointer.y );
-		panel.cursor( found ? mesh.toScan( found.point ).map( ( x, k ) => `${ 'XYZ'[ k ] } ${ x.toFixed( Math.min( mesh.decimals, 3 ) ) }` ).join( '   ' ) : '' );
+		panel.cursor( picker.coordinates( pointer.x, pointer.y ) );
 
 	}, 60 );
 
@@ -358,17 +353,19 @@ function start() {
 
 	// For tests and for those who drive the page by a program.
 	window.outcropViewer = {
-		mesh, navigator, actions, settings, section, pace,
+		world: mesh, navigator, actions, settings, section, pace, split,
+		/** The first mesh. */
+		get mesh() { return mesh.first; },
 		get ready() { return ready; },
 		get frame() { return frame; },
 		/** Time that the page itself takes for a picture, without that of the graphics, in ms. */
 		get milliseconds() { return milliseconds; },
 		/** True if nothing is loading and the last change is drawn. */
-		get settled() { return ready && ! dirty && ! stale && busy <= 0 && ! navigator.moving && ! paced && ! mesh.tiles.isLoading && mesh.stats().loading === 0; },
+		get settled() { return ready && ! dirty && ! stale && busy <= 0 && ! navigator.moving && ! paced && coming?.length === 0 && ! mesh.isLoading && mesh.stats( pictured() ).loading === 0; },
 		/** What is drawn, as a PNG in a URL. */
 		picture() { const now = performance.now(); update( now ); draw( now ); return canvas.toDataURL(); },
-		stats: () => mesh.stats(), vertexAt, hit, click, redraw: changed, use: () => mesh.use( navigator.camera, renderer ),
-		get measured() { return lengths( measured ); },
+		stats: () => mesh.stats( pictured() ), vertexAt: ( x, y ) => picker.vertexAt( x, y ), hit: ( x, y ) => picker.hit( x, y ), click: ( x, y ) => picker.click( x, y ), redraw: changed, use: () => mesh.use( navigator.camera ),
+		get measured() { return picker.lengths; },
 	};
 
 }

@@ -5,12 +5,10 @@ import { Color, DoubleSide, GLSL3, ShaderMaterial, Vector3, Vector4 } from 'thre
 /** Ways to colour the mesh; the numbers are those in the shader. */
 export const MODES = { plain: 0, color: 1, value: 2, height: 3, tile: 4, level: 4, class: 5 };
 
-/** Values that all tiles share. */
+/** Values that all tiles of all meshes share. */
 export const shared = {
-	uMode: { value: 0 },
 	uFlat: { value: 0 },
 	uBacks: { value: 1 },
-	uFront: { value: new Color( 0.80, 0.775, 0.73 ) },
 	uBack: { value: new Color( 0.33, 0.52, 0.80 ) },
 	uRamp: { value: null },
 	uClasses: { value: null },
@@ -21,8 +19,19 @@ export const shared = {
 	uWire: { value: new Color( 0.08, 0.09, 0.1 ) },
 };
 
+/** The diameter of points in pixels, and whether they have their own colours. */
+export const pointSize = { value: 2 }, pointStyle = { value: 1 };
+const pointPlain = { value: new Color( 0.10, 0.42, 0.70 ) };
+
+/** From linear light to what the screen shows. */
+const ENCODED = /* glsl */`
+vec3 encoded( vec3 c ) {
+	return mix( 12.92 * c, 1.055 * pow( max( c, 0.0 ), vec3( 1.0 / 2.4 ) ) - 0.055, step( 0.0031308, c ) );
+}`;
+
 const VERTEX = /* glsl */`
 in float value;
+uniform float uShift;
 uniform vec3 uUp;
 out vec3 vView;
 out vec3 vNormal;
@@ -39,7 +48,7 @@ void main() {
 	#else
 		vColor = vec3( 0.7 );
 	#endif
-	vValue = value;
+	vValue = value + uShift;
 	// The height above that of the tile, so that single precision suffices.
 	vHeight = mat3( modelMatrix )[0].z * position.x + mat3( modelMatrix )[1].z * position.y + mat3( modelMatrix )[2].z * position.z + uLow;
 	gl_Position = projectionMatrix * view;
@@ -68,6 +77,7 @@ uniform vec3 uTile;
 uniform vec4 uRange;
 uniform sampler2D uRamp;
 uniform sampler2D uClasses;
+${ ENCODED }
 vec3 ramp( float x ) {
 	float t = clamp( ( x - uRange.x ) / max( uRange.y - uRange.x, 1e-30 ), 0.0, 1.0 );
 	return texture( uRamp, vec2( t * 255.0 / 256.0 + 0.5 / 256.0, 0.5 ) ).rgb;
@@ -79,7 +89,7 @@ void main() {
 	// The side that is seen is lit, whichever way the triangle runs.
 	if ( dot( n, face ) < 0.0 ) n = -n;
 	vec3 base = uFront;
-	if ( uMode == 1 ) base = mix( 12.92 * vColor, 1.055 * pow( max( vColor, 0.0 ), vec3( 1.0 / 2.4 ) ) - 0.055, step( 0.0031308, vColor ) );
+	if ( uMode == 1 ) base = encoded( vColor );
 	else if ( uMode == 2 ) base = ramp( vValue );
 	else if ( uMode == 3 ) base = ramp( vHeight );
 	else if ( uMode == 4 ) base = uTile;
@@ -93,17 +103,21 @@ void main() {
 	outColor = vec4( min( base * light, 1.0 ), 1.0 );
 }`;
 
-const LINE_VERTEX = /* glsl */`
+/** The place of a line or point: a little nearer than its triangles, at the same place of the picture. */
+const NEARER = /* glsl */`
 out vec3 vView;
 uniform float uNear;
-void main() {
+void place() {
 	vec4 view = modelViewMatrix * vec4( position, 1.0 );
 	vView = view.xyz;
-	// A little nearer than the triangles that the line belongs to, at the same place of the picture.
 	if ( projectionMatrix[3][3] == 1.0 ) view.z += uNear * 2.0 / projectionMatrix[1][1];
 	else view.xyz *= 1.0 - uNear;
 	gl_Position = projectionMatrix * view;
 }`;
+
+const LINE_VERTEX = /* glsl */`
+${ NEARER }
+void main() { place(); }`;
 
 const LINE_FRAGMENT = /* glsl */`
 layout(location = 0) out vec4 outColor;
@@ -115,14 +129,47 @@ void main() {
 	outColor = vec4( uColor, uOpacity );
 }`;
 
-/** The material of a tile's triangles. `low` is the tile's lowest place in height, `color` that of the tile. */
-export function surface( colors, low, color ) {
+const POINT_VERTEX = /* glsl */`
+${ NEARER }
+uniform float uSize;
+out vec3 vColor;
+void main() {
+	place();
+	#ifdef USE_COLOR
+		vColor = color;
+	#else
+		vColor = vec3( 0.0 );
+	#endif
+	gl_PointSize = uSize;
+}`;
+
+const POINT_FRAGMENT = /* glsl */`
+layout(location = 0) out vec4 outColor;
+${ CUT }
+${ ENCODED }
+in vec3 vColor;
+uniform float uSize;
+uniform float uStyle;
+uniform vec3 uPlain;
+void main() {
+	cut();
+	// Small ones stay square: of a round one of two pixels nothing would be left.
+	vec2 from = gl_PointCoord - 0.5;
+	if ( uSize > 3.0 && dot( from, from ) > 0.25 ) discard;
+	outColor = vec4( uStyle > 0.5 ? encoded( vColor ) : uPlain, 1.0 );
+}`;
+
+/**
+ * The material of a tile's triangles. `low` is the tile's lowest place in height, `color` that of the tile, and `own`
+ * has the values of its mesh.
+ */
+export function surface( colors, low, color, own ) {
 
 	return new ShaderMaterial( {
 		glslVersion: GLSL3,
 		vertexShader: VERTEX,
 		fragmentShader: FRAGMENT,
-		uniforms: { ...shared, uLow: { value: low }, uTile: { value: color } },
+		uniforms: { ...shared, ...own, uLow: { value: low }, uTile: { value: color } },
 		vertexColors: colors,
 		side: DoubleSide,
 	} );
@@ -149,3 +196,16 @@ export const boundary = () => lines( shared.uLine, 1, 8e-4, false );
 
 /** The material of the edges of all triangles. */
 export const wire = () => lines( shared.uWire, 0.35, 4e-4, true );
+
+/** The material of points. */
+export function points( colors ) {
+
+	return new ShaderMaterial( {
+		glslVersion: GLSL3,
+		vertexShader: POINT_VERTEX,
+		fragmentShader: POINT_FRAGMENT,
+		uniforms: { uCut: shared.uCut, uSize: pointSize, uStyle: pointStyle, uPlain: pointPlain, uNear: { value: 6e-4 } },
+		vertexColors: colors,
+	} );
+
+}

@@ -1,53 +1,51 @@
-// The mesh: tiles as they come and go, their materials, and what is known of them.
+// A mesh: tiles as they come and go, their materials, and what is known of them.
 
-import { Color, Matrix4, Mesh, Sphere, Vector3 } from 'three';
+import { Box3, Color, Matrix4, Mesh, Sphere, Vector3 } from 'three';
 import { GLTFLoader } from 'three/examples/jsm/loaders/GLTFLoader.js';
 import { MeshoptDecoder } from 'meshoptimizer/decoder';
 import { TilesRenderer } from '3d-tiles-renderer/three';
-import { boundary, MODES, shared, surface, wire } from './material.js';
-import { classTexture, distinct, rampTexture } from './ramps.js';
+import { decimals } from './format.js';
+import { boundary, MODES, surface, wire } from './material.js';
+import { distinct } from './ramps.js';
 import { source } from './source.js';
 
 /** Linear light as sRGB, both from 0 to 1. */
 const encoded = x => x <= 0.0031308 ? 12.92 * x : 1.055 * x ** ( 1 / 2.4 ) - 0.055;
-
-/** Triangles that are drawn at most, as far as levels of detail allow. */
-const MOST_TRIANGLES = 6e6;
 
 /** Number of values looked at for the range of a column. */
 const SAMPLES = 20000;
 
 const wireMaterial = wire();
 
-/** Number of decimals of a lattice step. */
-export function decimals( step ) {
-
-	for ( let n = 0; n < 12; n ++ ) if ( Math.abs( step * 10 ** n - Math.round( step * 10 ** n ) ) < 1e-9 * 10 ** n * step ) return n;
-	return 12;
-
-}
-
 export class MeshView {
 
-	/** `changed` is called when something new is to be drawn, `failed` with a message when something cannot be. */
-	constructor( renderer, camera, { changed, failed, opened } ) {
+	/**
+	 * `part` tells where the mesh is, and how it lies in the coordinates of the page; `front` is its one colour. `changed`
+	 * is called when something new is to be drawn, `failed` with a message when something cannot be.
+	 */
+	constructor( renderer, camera, { part, front, changed, failed, opened } ) {
 
-		const from = source();
+		const from = source( part.path );
 		this.changed = changed;
+		this.name = part.name;
+		this.matrix = part.matrix ? new Matrix4().fromArray( part.matrix ) : new Matrix4();
+		this.inverse = this.matrix.clone().invert();
+		/** Values that the tiles of this mesh share. */
+		this.own = { uMode: { value: 0 }, uFront: { value: front }, uShift: { value: 0 } };
 		this.embedded = from.embedded;
 		this.mode = 'plain';
 		this.wireframe = false;
 		this.edges = false;
-		this.ranges = new Map();
 		this.missing = new Set();
 		this.detail = 1.5;
 		this.coarser = 1;
 		this.info = {};
-		shared.uRamp.value = rampTexture();
-		shared.uClasses.value = classTexture();
 
 		const tiles = this.tiles = new TilesRenderer( from.url );
 		tiles.registerPlugin( from.plugin );
+		tiles.group.matrixAutoUpdate = false;
+		tiles.group.matrix.copy( this.matrix );
+		tiles.group.updateMatrixWorld( true );
 		const loader = new GLTFLoader( tiles.manager );
 		loader.setMeshoptDecoder( MeshoptDecoder );
 		tiles.manager.addHandler( /\.(gltf|glb)$/, loader );
@@ -60,7 +58,7 @@ export class MeshView {
 		tiles.addEventListener( 'load-model', changed );
 		tiles.addEventListener( 'dispose-model', ( { tile } ) => tile.surface = tile.wires = null );
 		tiles.addEventListener( 'tile-visibility-change', ( { tile, visible } ) => this.#shown( tile, visible ) );
-		tiles.addEventListener( 'load-root-tileset', ( { tileset } ) => opened( this.#open( tileset ) ) );
+		tiles.addEventListener( 'load-root-tileset', ( { tileset } ) => { this.#open( tileset ); opened(); } );
 		tiles.addEventListener( 'load-error', ( { tile, error, url } ) => this.#missing( tile, error, url, failed ) );
 		this.budget = 1024;
 
@@ -99,11 +97,8 @@ export class MeshView {
 		};
 		// Rounded coordinates have as many decimals as are right.
 		this.decimals = this.info.step > 0 ? this.info.exact === false ? Math.max( 0, Math.floor( - Math.log10( 2 * this.info.step ) ) ) : decimals( this.info.step ) : 3;
-		this.height = { low: 0, high: 1 };
-		const sphere = new Sphere();
+		const sphere = new Sphere(), box = new Box3();
 		this.tiles.getBoundingSphere( sphere );
-		this.sphere = sphere;
-		const box = { min: new Vector3(), max: new Vector3() };
 		const bounds = tileset.root.boundingVolume.box;
 		if ( bounds ) {
 
@@ -111,15 +106,9 @@ export class MeshView {
 			box.min.fromArray( bounds ).sub( half );
 			box.max.fromArray( bounds ).add( half );
 
-		} else {
-
-			box.min.copy( sphere.center ).subScalar( sphere.radius );
-			box.max.copy( sphere.center ).addScalar( sphere.radius );
-
-		}
-
-		this.box = box;
-		return this.info;
+		} else sphere.getBoundingBox( box );
+		this.sphere = sphere.applyMatrix4( this.matrix );
+		this.box = box.applyMatrix4( this.matrix );
 
 	}
 
@@ -170,7 +159,9 @@ export class MeshView {
 			object.material.dispose();
 			// The scene stands in the frame of the mesh: its matrix has the turn to z-up.
 			matrix.copy( object.matrixWorld );
-			object.userData.place = new Vector3().setFromMatrixPosition( matrix );
+			object.userData.own = matrix.clone();
+			object.userData.mesh = this;
+			object.userData.tile = tile;
 			if ( object.isLineSegments ) {
 
 				object.material = boundary();
@@ -181,7 +172,7 @@ export class MeshView {
 			} else {
 
 				const colors = Boolean( object.geometry.attributes.color );
-				object.material = surface( colors, matrix.elements[ 14 ], new Color() );
+				object.material = surface( colors, matrix.premultiply( this.matrix ).elements[ 14 ], new Color(), this.own );
 				tile.surface = object;
 				this.#color( tile );
 
@@ -191,10 +182,13 @@ export class MeshView {
 
 	}
 
+	/** What is known of a column, if the mesh has it. */
+	column( name ) { return this.info.columns.find( c => c.name === name ); }
+
 	/** The attribute of a column in tiles. */
 	#attribute( geometry, name ) {
 
-		const column = this.info.columns.find( c => c.name === name );
+		const column = this.column( name );
 		return geometry.attributes[ ( column?.attribute ?? '_' + name ).toLowerCase() ];
 
 	}
@@ -241,46 +235,30 @@ export class MeshView {
 
 	}
 
-	/** Colours by plain, color, height, tile, level, or column:NAME. */
-	colorBy( mode ) {
+	/** True if the tiles have the colours of the scan. */
+	get hasColors() { return Boolean( this.info.colors ?? this.column( 'red' ) ); }
+
+	/**
+	 * Colours by plain, color, height, tile, level, or column:NAME, whose values are shown less `offset`. What the mesh
+	 * does not have is shown in its one colour.
+	 */
+	colorBy( mode, offset ) {
 
 		this.mode = mode;
-		const name = mode.startsWith( 'column:' ) ? mode.slice( 7 ) : null;
-		shared.uMode.value = name ? ( this.isClass( name ) ? MODES.class : MODES.value ) : MODES[ mode ] ?? 0;
+		const name = mode.startsWith( 'column:' ) ? mode.slice( 7 ) : null, column = this.column( name );
+		const has = name ? column : mode !== 'color' || this.hasColors;
+		this.own.uMode.value = ! has ? 0 : name ? ( name === 'classification' ? MODES.class : MODES.value ) : MODES[ mode ] ?? 0;
+		this.own.uShift.value = ( column?.offset ?? 0 ) - ( name ? offset : 0 );
 		this.#each( tile => tile.surface && this.#color( tile ) );
-		const range = this.range( mode );
-		if ( range ) this.setRange( mode, range.low, range.high );
 		this.changed();
 
 	}
 
-	isClass( name ) { return name === 'classification'; }
-
-	/** The values at the ends of the ramp; of a column less its offset. */
-	range( mode ) {
-
-		if ( ! this.ranges.has( mode ) ) {
-
-			const measured = this.#measure( mode );
-			if ( ! measured ) return null;
-			this.ranges.set( mode, measured );
-
-		}
-
-		return this.ranges.get( mode );
-
-	}
-
-	setRange( mode, low, high ) {
-
-		this.ranges.set( mode, { low, high } );
-		shared.uRange.value.set( low, high, 0, 0 );
-		this.changed();
-
-	}
-
-	/** Range of a column, or of heights, without the outermost hundredths, from the coarsest tile in memory. */
-	#measure( mode ) {
+	/**
+	 * Range of a column less `offset`, or of heights, without the outermost hundredths, from the coarsest tile in memory;
+	 * null if there is none.
+	 */
+	measure( mode, offset ) {
 
 		if ( mode !== 'height' && ! mode.startsWith( 'column:' ) ) return null;
 		let coarsest = null;
@@ -290,23 +268,22 @@ export class MeshView {
 
 		} );
 		if ( ! coarsest ) return null;
-		const { geometry, userData, matrixWorld } = coarsest.surface;
-		const attribute = mode === 'height' ? geometry.attributes.position : this.#attribute( geometry, mode.slice( 7 ) );
+		const { geometry, userData } = coarsest.surface;
+		const height = mode === 'height', attribute = height ? geometry.attributes.position : this.#attribute( geometry, mode.slice( 7 ) );
 		if ( ! attribute ) return null;
+		const shift = height ? 0 : ( this.column( mode.slice( 7 ) ).offset ?? 0 ) - offset;
 		const stride = Math.max( 1, Math.floor( attribute.count / SAMPLES ) );
-		const values = [];
-		const at = new Vector3();
+		const values = [], at = new Vector3(), world = this.matrix.clone().multiply( userData.own );
 		for ( let n = 0; n < attribute.count; n += stride ) {
 
-			const value = mode === 'height' ? at.fromBufferAttribute( attribute, n ).applyMatrix4( matrixWorld ).z : attribute.getX( n );
+			const value = height ? at.fromBufferAttribute( attribute, n ).applyMatrix4( world ).z : attribute.getX( n ) + shift;
 			if ( Number.isFinite( value ) ) values.push( value );
 
 		}
 
 		values.sort( ( a, b ) => a - b );
 		const cut = Math.floor( values.length / 100 );
-		const [ low, high ] = [ values[ cut ] ?? 0, values[ values.length - 1 - cut ] ?? 1 ];
-		return { low, high: high > low ? high : low + 1, place: userData.place };
+		return { low: values[ cut ] ?? 0, high: values[ values.length - 1 - cut ] ?? 1 };
 
 	}
 
@@ -352,12 +329,12 @@ export class MeshView {
 
 	}
 
-	/** Makes the next frames coarser if there are too many triangles, or less so if there are few. */
-	limit( triangles ) {
+	/** Makes the next frames coarser (1), or less so (-1). */
+	limit( way ) {
 
 		const before = this.coarser;
-		if ( triangles > MOST_TRIANGLES ) this.coarser = Math.min( this.coarser * 1.25, 64 );
-		else if ( triangles < 0.6 * MOST_TRIANGLES && this.coarser > 1 ) this.coarser = Math.max( this.coarser / 1.1, 1 );
+		if ( way > 0 ) this.coarser = Math.min( this.coarser * 1.25, 64 );
+		else if ( way < 0 && this.coarser > 1 ) this.coarser = Math.max( this.coarser / 1.1, 1 );
 		if ( this.coarser !== before ) this.changed();
 
 	}
@@ -384,11 +361,11 @@ export class MeshView {
 
 	// Coordinates.
 
-	/** Local coordinates as those of the scan. */
-	toScan( local ) { return [ local.x, local.y, local.z ].map( ( x, k ) => x + this.info.origin[ k ] ); }
+	/** Coordinates of the page as those of the scan. */
+	toScan( local ) { return local.clone().applyMatrix4( this.inverse ).toArray().map( ( x, k ) => x + this.info.origin[ k ] ); }
 
-	/** The scan's coordinates as local ones. */
-	toLocal( scan ) { return new Vector3( ...scan.map( ( x, k ) => x - this.info.origin[ k ] ) ); }
+	/** The scan's coordinates as those of the page. */
+	toLocal( scan ) { return new Vector3( ...scan.map( ( x, k ) => x - this.info.origin[ k ] ) ).applyMatrix4( this.matrix ); }
 
 	/**
 	 * A vertex of a tile: its exact coordinates, by the whole numbers that the tile has of the lattice, and its
@@ -396,14 +373,13 @@ export class MeshView {
 	 */
 	vertex( object, index ) {
 
-		const { geometry, matrixWorld: { elements: m }, userData: { place, tile } } = object;
+		const { geometry, userData: { own: { elements: m }, tile } } = object;
 		const { position, _low: low } = geometry.attributes;
 		const p = [ position.getX( index ), position.getY( index ), position.getZ( index ) ];
 		if ( low ) [ low.getX( index ), low.getY( index ), low.getZ( index ) ].forEach( ( x, k ) => p[ k ] += x );
-		const local = new Vector3( ...[ 0, 1, 2 ].map( k => m[ k ] * p[ 0 ] + m[ 4 + k ] * p[ 1 ] + m[ 8 + k ] * p[ 2 ] + [ place.x, place.y, place.z ][ k ] ) );
-		const { step } = this.info;
-		if ( step > 0 ) [ 'x', 'y', 'z' ].forEach( a => local[ a ] = Math.round( local[ a ] / step ) * step );
-		const scan = this.toScan( local );
+		const { step, origin } = this.info;
+		const own = [ 0, 1, 2 ].map( k => m[ k ] * p[ 0 ] + m[ 4 + k ] * p[ 1 ] + m[ 8 + k ] * p[ 2 ] + m[ 12 + k ] ).map( x => step > 0 ? Math.round( x / step ) * step : x );
+		const scan = own.map( ( x, k ) => x + origin[ k ] ), local = new Vector3( ...own ).applyMatrix4( this.matrix );
 		const values = this.info.columns.map( ( { name, offset = 0 } ) => {
 
 			const attribute = this.#attribute( geometry, name );

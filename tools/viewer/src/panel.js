@@ -2,6 +2,7 @@
 
 import { grouped, make, mib, plain, short } from './format.js';
 import { icon } from './icons.js';
+import { told } from './progress.js';
 import { CLASSES, classColor, rampCss } from './ramps.js';
 
 const $ = id => document.getElementById( id );
@@ -15,7 +16,7 @@ const KEYS = [
 	[ 'Looking', [
 		[ 'Click', 'coordinates of the nearest vertex' ], [ 'M', 'measure; Esc ends it' ], [ 'C', 'colour by the next property' ],
 		[ 'E', 'eye-dome lighting' ], [ 'T', 'flat triangles' ], [ 'K', 'back faces in blue' ], [ 'X', 'edges of triangles' ],
-		[ 'B', 'boundary edges' ], [ 'L', 'copy a link to the view' ], [ 'N', 'light or dark' ], [ '?', 'this help' ],
+		[ 'B', 'boundary edges' ], [ 'V', 'of two meshes: both sides, A, B, both' ], [ '[  ]', 'move the line between them' ], [ 'P', 'points of the cloud' ], [ 'L', 'copy a link to the view' ], [ 'N', 'light or dark' ], [ '?', 'this help' ],
 	] ],
 ];
 
@@ -46,6 +47,9 @@ export class Panel {
 
 		}
 
+		$( 'points-on' ).addEventListener( 'change', event => actions.points( { on: event.target.checked } ) );
+		$( 'points-size' ).addEventListener( 'input', event => actions.points( { size: Number( event.target.value ) } ) );
+		$( 'points-color' ).addEventListener( 'change', event => actions.points( { color: event.target.value } ) );
 		$( 'section-at' ).addEventListener( 'input', event => actions.sectionAt( event.target.value / 1000 ) );
 		$( 'section-flip' ).addEventListener( 'click', () => actions.sectionFlip() );
 		$( 'help' ).append(
@@ -87,18 +91,41 @@ export class Panel {
 
 	help() { $( 'help' ).open ? $( 'help' ).close() : $( 'help' ).showModal(); }
 
-	/** The mesh is known. */
-	opened( info, modes ) {
+	/** Meshes are known, and the properties by which they can be coloured. */
+	opened( world, modes ) {
 
-		const name = info.source.replace( /^.*[\\/]/, '' );
-		document.title = `${ name } – outcrop`;
-		$( 'name' ).textContent = $( 'name' ).title = name;
+		const name = ( { name, info } ) => name || info.source.replace( /^.*[\\/]/, '' );
+		const meshes = world.open, single = meshes.length === 1, { info } = world.first;
+		const names = single ? info.source.replace( /^.*[\\/]/, '' ) : meshes.map( name ).join( ', ' );
+		document.title = `${ names } – outcrop`;
+		$( 'name' ).textContent = $( 'name' ).title = names;
 		// The name of a reference system is the first text in quotes of WKT.
 		const crs = info.crs && ( info.crs.match( /^\s*\w+\s*\[\s*"([^"]*)"/ )?.[ 1 ] ?? info.crs );
 		const system = [ crs && crs.length <= 60 ? crs : null, info.epsg && ! String( crs ).includes( info.epsg ) ? `EPSG:${ info.epsg }` : null ];
-		$( 'about' ).textContent = [ `${ short( info.triangles ) } triangles`, ...system ].filter( Boolean ).join( ' · ' );
-		$( 'about' ).title = `${ grouped( info.triangles ) } triangles, ${ grouped( info.vertices ?? 0 ) } vertices, ${ grouped( info.boundary_edges ?? 0 ) } boundary edges${ info.crs ? `\n${ info.crs }` : '' }`;
+		$( 'about' ).textContent = [ `${ meshes.map( mesh => short( mesh.info.triangles ) ).join( ' and ' ) } triangles`, ...system ].filter( Boolean ).join( ' · ' );
+		$( 'about' ).title = meshes.map( ( { info } ) => `${ grouped( info.triangles ) } triangles, ${ grouped( info.vertices ?? 0 ) } vertices, ${ grouped( info.boundary_edges ?? 0 ) } boundary edges${ info.crs ? `\n${ info.crs }` : '' }` ).join( '\n' );
 		$( 'color' ).replaceChildren( ...modes.map( ( [ value, text ] ) => make( 'option', { value, textContent: text } ) ) );
+
+	}
+
+	/** Points are there. */
+	points( info ) {
+
+		$( 'points' ).hidden = false;
+		const all = info.points === info.of_points ? `All ${ short( info.points ) } points` : `${ short( info.points ) } of ${ short( info.of_points ) } points, one in each box of at most ${ plain( info.side, 4 ) }`;
+		$( 'points-note' ).textContent = `${ info.name }: ${ all }`;
+		$( 'points-note' ).title = `${ grouped( info.points ) } of ${ grouped( info.of_points ) } points`;
+		$( 'points-by' ).hidden = ! info.colors;
+
+	}
+
+	/** How far a part is, as long as there is nothing to look at; null if it is loading. */
+	loading( part ) {
+
+		const { text, share } = part ? told( part ) : { text: 'Loading the mesh', share: null };
+		$( 'loading' ).querySelector( 'p' ).textContent = text;
+		$( 'loading' ).querySelector( 'b' ).hidden = share === null;
+		$( 'loading' ).querySelector( 'i' ).style.width = `${ 100 * ( share ?? 0 ) }%`;
 
 	}
 
@@ -117,6 +144,9 @@ export class Panel {
 
 		for ( const name of [ 'edl', 'flat', 'backs', 'wire', 'boundary' ] ) $( name ).checked = settings[ name ];
 		$( 'color' ).value = settings.color;
+		$( 'points-on' ).checked = mesh.cloud.on;
+		$( 'points-size' ).value = mesh.cloud.size;
+		$( 'points-color' ).value = mesh.cloud.color;
 		$( 'detail' ).value = settings.detail;
 		$( 'budget' ).value = settings.budget;
 		const pressed = { parallel: navigator.orthographic, fly: navigator.flying, measure: measuring };
@@ -159,7 +189,7 @@ export class Panel {
 
 		}
 
-		const add = mode === 'height' ? mesh.info.origin[ 2 ] : mesh.info.columns.find( c => c.name === name )?.offset ?? 0;
+		const add = mode === 'height' ? mesh.info.origin[ 2 ] : mesh.offset( mode );
 		const digits = mode === 'height' ? Math.min( mesh.decimals, 3 ) : 3;
 		const bar = make( 'div', { className: 'bar' } );
 		bar.style.background = rampCss;
@@ -174,10 +204,12 @@ export class Panel {
 
 	}
 
-	stats( s, info, fps ) {
+	/** Counts of what is drawn of the meshes in the picture. */
+	stats( s, meshes, fps ) {
 
+		const all = meshes.reduce( ( sum, mesh ) => sum + mesh.info.triangles, 0 );
 		const rows = [
-			[ 'Triangles', `${ short( s.triangles ) } of ${ short( info.triangles ) }` ],
+			[ 'Triangles', `${ short( s.triangles ) } of ${ short( all ) }` ],
 			[ 'Tiles shown, held', `${ s.tiles }, ${ s.held }` ],
 			[ 'Loading', s.loading || '–' ],
 			[ 'Memory', mib( s.bytes ) ],

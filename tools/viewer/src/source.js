@@ -10,11 +10,11 @@ function decode( text ) {
 
 }
 
-/** The tileset's URL, and a plugin of the renderer that gets files. */
-export function source() {
+/** The URL of the tileset at a path, and a plugin of the renderer that gets files. */
+export function source( path ) {
 
 	const embedded = document.getElementById( 'embedded-tileset' );
-	const root = new URL( 'mesh/', location.href.split( '#' )[ 0 ] );
+	const root = new URL( path, location.href.split( '#' )[ 0 ] );
 	const url = new URL( 'tileset.json', root ).href;
 	// The version is checked here; the renderer warns of each that is not 1.0.
 	const read = json => {

@@ -1,0 +1,117 @@
+//! The moment at which the page can be opened: its address is printed, and a browser called.
+
+use super::super::output::print;
+use outcrop_disk::error::{Error, Result, Setting};
+use outcrop_disk::workspace::lock;
+use outcrop_disk::workspace::outlook::Planned;
+use outcrop_disk::workspace::progress::Observer;
+use std::process::{Command, Stdio};
+use std::sync::{Arc, Mutex};
+
+/// What is done once, when the page has something to show: at the latest when the first part of it is there, and
+/// before that when the work on it begins. What is refused before that gets its message, and no page.
+pub struct Opening {
+    pub url: String,
+    /// True if a browser is to be opened.
+    pub browser: bool,
+    /// A line for people.
+    pub line: Option<String>,
+    state: Mutex<State>,
+}
+
+enum State {
+    Coming,
+    Done,
+    Failed(Error),
+}
+
+impl Opening {
+    pub fn new(url: String, browser: bool, line: Option<String>) -> Self {
+        Self {
+            url,
+            browser,
+            line,
+            state: Mutex::new(State::Coming),
+        }
+    }
+
+    /// Opens the page, unless that was done.
+    pub fn now(&self) -> Result<()> {
+        let mut state = lock(&self.state);
+        match std::mem::replace(&mut *state, State::Done) {
+            State::Coming => {
+                print(&self.url)?;
+                if let Some(line) = &self.line {
+                    eprintln!("outcrop: {line}");
+                }
+                if self.browser {
+                    open(&self.url);
+                }
+                Ok(())
+            }
+            State::Done => Ok(()),
+            State::Failed(error) => Err(error),
+        }
+    }
+}
+
+/// Opens the page when work begins, and passes everything on.
+pub struct Beginning {
+    pub opening: Arc<Opening>,
+    pub other: Arc<dyn Observer>,
+}
+
+impl Observer for Beginning {
+    fn plan(&self, stages: &[Planned]) {
+        self.other.plan(stages);
+    }
+
+    fn begin(&self, name: &'static str, unit: &'static str, total: u64) {
+        if let Err(error) = self.opening.now() {
+            // The next one who opens it is told.
+            *lock(&self.opening.state) = State::Failed(error);
+        }
+        self.other.begin(name, unit, total);
+    }
+
+    fn advance(&self, count: u64) {
+        self.other.advance(count);
+    }
+
+    fn end(&self) {
+        self.other.end();
+    }
+
+    fn warn(&self, message: &str) {
+        self.other.warn(message);
+    }
+
+    fn spell(&self, setting: &Setting) -> String {
+        self.other.spell(setting)
+    }
+}
+
+/// Opens a browser, if there is one.
+fn open(url: &str) {
+    let (program, before): (&str, &[&str]) = if cfg!(target_os = "macos") {
+        ("open", &[])
+    } else if cfg!(windows) {
+        ("cmd", &["/C", "start", ""])
+    } else {
+        let screen = |name| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+        if !["DISPLAY", "WAYLAND_DISPLAY"].into_iter().any(screen) {
+            return;
+        }
+        ("xdg-open", &[])
+    };
+    let mut command = Command::new(program);
+    command.args(before).arg(url);
+    let silent = command
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null());
+    if let Ok(mut child) = silent.spawn() {
+        // It may stay for as long as the browser does.
+        std::thread::spawn(move || child.wait());
+    }
+}
