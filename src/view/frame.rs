@@ -59,8 +59,14 @@ impl Facts {
     fn refused(&self, first: &Self) -> Error {
         let (system, path) = (first.system(), first.path.display());
         let expected = format!("{system}, that of {path}");
-        let remedy = Remedy::Command("tiles --geo", "on both, which places them on the globe");
-        Error::input(&self.path, "reference system", self.system(), expected).with(remedy)
+        let refused = Error::input(&self.path, "reference system", self.system(), expected);
+        match self.is_cloud {
+            true => refused,
+            false => refused.with(Remedy::Command(
+                "tiles --geo",
+                "on both, which places them on the globe",
+            )),
+        }
     }
 }
 
@@ -107,6 +113,7 @@ mod tests {
     fn facts(epsg: Option<u64>, origin: [f64; 3]) -> Facts {
         Facts {
             path: "b/tileset.json".into(),
+            is_cloud: false,
             is_ours: true,
             origin,
             epsg,

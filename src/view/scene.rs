@@ -7,7 +7,7 @@ use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::lock;
 use outcrop_disk::workspace::outlook::{Outlook, Planned};
 use serde_json::{Value, json};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -107,9 +107,13 @@ impl Scene {
 
     /// A part is in this folder from now on.
     pub fn show(&self, part: Part, path: &Path) -> Result<()> {
-        let facts = Tileset::check(path)?;
+        let mut facts = Tileset::check(path)?;
         let folder = Folder::new(path).map_err(|e| Error::io(path, "open the folder", e))?;
         let mut parts = lock(&self.parts);
+        if let Some(shown) = parts.iter().find(|shown| shown.part == part) {
+            // The folder may be one of scratch files, which tells nobody anything.
+            facts.path = PathBuf::from(&shown.name);
+        }
         let first = parts.iter().find_map(|shown| match &shown.state {
             State::Ready(ready) if shown.part == Part::First => Some(&ready.facts),
             _ => None,

@@ -94,6 +94,8 @@ struct Uri {
 pub struct Facts {
     /// Its `tileset.json`.
     pub path: PathBuf,
+    /// True for points of a cloud.
+    pub is_cloud: bool,
     /// True if this program made it: its coordinates are those of the scan less the origin.
     pub is_ours: bool,
     /// The origin of its coordinates.
@@ -157,6 +159,7 @@ impl Place<'_> {
             Self::Folder(folder) => Tileset::check(folder),
             Self::Mesh(path, epsg) => Ok(Facts {
                 path: path.to_path_buf(),
+                is_cloud: false,
                 is_ours: true,
                 origin: [0.0; 3],
                 epsg: epsg.map(u64::from),
@@ -208,6 +211,7 @@ impl Tileset {
         let origin = serde_json::from_value(noted["origin"].clone()).ok();
         Ok(Facts {
             path: folder.join(NAME),
+            is_cloud: noted["of_points"].is_number(),
             is_ours: origin.is_some(),
             origin: origin.unwrap_or_default(),
             epsg: noted["epsg"].as_u64(),

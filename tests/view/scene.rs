@@ -2,7 +2,7 @@
 
 use super::bench::{Bench, get, root};
 use super::program;
-use outcrop::{Observer, Silent};
+use outcrop::Silent;
 use outcrop_view::{Part, Server};
 use serde_json::Value;
 use std::fmt::Write;

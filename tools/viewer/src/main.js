@@ -3,6 +3,7 @@
 import { ColorManagement, LinearSRGBColorSpace, Matrix4, Scene, WebGLRenderer } from 'three';
 import { Dome } from './dome.js';
 import { drawAxes, Marks, roundLength } from './marks.js';
+import { plain } from './format.js';
 import * as link from './link.js';
 import { shared } from './material.js';
 import { Navigator } from './navigator.js';
@@ -97,21 +98,12 @@ function start() {
 
 	// Meshes and points come.
 
-	/** Names of the properties that colours can show, and what they are called. */
-	function modes() {
-
-		const columns = mesh.columns.filter( name => ! [ 'red', 'green', 'blue', 'nx', 'ny', 'nz' ].includes( name ) );
-		return [ [ 'plain', 'One colour' ], ...( mesh.open.some( one => one.hasColors ) ? [ [ 'color', 'Scan colour' ] ] : [] ), [ 'height', 'Height' ],
-			...columns.map( name => [ `column:${ name }`, name[ 0 ].toUpperCase() + name.slice( 1 ).replaceAll( '_', ' ' ) ] ), [ 'tile', 'Tile' ], [ 'level', 'Level of detail' ] ];
-
-	}
-
 	/** The tree of a mesh is there, or, without one, the points are. */
 	function opened( one ) {
 
 		if ( one ) {
 
-			const all = modes();
+			const all = mesh.modes;
 			actions.modes = all.map( ( [ mode ] ) => mode );
 			panel.opened( mesh, all );
 			mesh.colorBy( settings.color );
@@ -132,7 +124,14 @@ function start() {
 			if ( ! restore() ) fit();
 			apply();
 
-		} else if ( fitted === JSON.stringify( navigator.state() ) ) fit();
+		} else if ( ready ) {
+
+			const name = one ? one.name : mesh.cloud.info.name, away = mesh.astray( one ? one.box : mesh.cloud.box );
+			if ( away !== null ) panel.message( 'astray', `${ name } lies ${ plain( away, 0 ) } away from ${ mesh.first.name }: it may have other coordinates.` );
+
+		}
+
+		if ( one !== mesh.first && fitted === JSON.stringify( navigator.state() ) ) fit();
 		show();
 		changed();
 
@@ -151,10 +150,7 @@ function start() {
 
 			const meshes = all.filter( part => part.kind === 'mesh' );
 			if ( meshes.length > 1 ) split.name( meshes.map( part => part.name ) );
-			const { mode, at, points } = link.readShown( location.hash );
-			split.set( mode );
-			if ( at !== null ) split.move( at );
-			mesh.cloud.set( points );
+			restoreShown();
 
 		},
 		ready( part ) {
@@ -194,6 +190,15 @@ function start() {
 
 	// Links.
 
+	function restoreShown() {
+
+		const { mode, at, points } = link.readShown( location.hash );
+		split.set( mode );
+		if ( at !== null ) split.move( at );
+		mesh.cloud.set( points );
+
+	}
+
 	function restore() {
 
 		const view = link.read( location.hash, mesh );
@@ -215,7 +220,13 @@ function start() {
 
 	}
 
-	addEventListener( 'hashchange', () => ready && location.hash !== written && restore() && actions.color( settings.color ) );
+	addEventListener( 'hashchange', () => {
+
+		if ( ! ready || location.hash === written || ! restore() ) return;
+		restoreShown();
+		actions.color( settings.color );
+
+	} );
 
 	// Keys.
 

@@ -12,6 +12,9 @@ const MOST_TRIANGLES = 6e6;
 /** The one colour of each mesh. */
 const FRONTS = [ new Color( 0.80, 0.775, 0.73 ), new Color( 0.86, 0.62, 0.42 ) ];
 
+/** What is farther from the first mesh than so many times the radii of both may have other coordinates. */
+const ASTRAY = 5;
+
 /** Before there is anything. */
 const NOTHING = { sphere: new Sphere( new Vector3(), 1 ), box: new Box3( new Vector3( - 1, - 1, - 1 ), new Vector3( 1, 1, 1 ) ) };
 
@@ -100,6 +103,15 @@ export class World {
 
 	}
 
+	/** The distance of something from the first mesh, if it is so far away that it may be there by mistake; else null. */
+	astray( box ) {
+
+		const other = box.getBoundingSphere( new Sphere() ), { center, radius } = this.first.sphere;
+		const distance = other.center.distanceTo( center );
+		return distance > ASTRAY * ( other.radius + radius ) ? distance : null;
+
+	}
+
 	/** Meshes of which the tree of tiles is there, once that of the first one is. */
 	get open() { return this.first?.box ? this.meshes.filter( mesh => mesh.box ) : []; }
 
@@ -152,8 +164,15 @@ export class World {
 
 	// Colours.
 
-	/** Names of the columns of any mesh. */
-	get columns() { return [ ...new Set( this.open.flatMap( mesh => mesh.info.columns.map( column => column.name ) ) ) ]; }
+	/** The properties of any mesh that colours can show, and what they are called. */
+	get modes() {
+
+		const names = [ ...new Set( this.open.flatMap( mesh => mesh.info.columns.map( column => column.name ) ) ) ];
+		const columns = names.filter( name => ! [ 'red', 'green', 'blue', 'nx', 'ny', 'nz' ].includes( name ) );
+		return [ [ 'plain', 'One colour' ], ...( this.open.some( mesh => mesh.hasColors ) ? [ [ 'color', 'Scan colour' ] ] : [] ), [ 'height', 'Height' ],
+			...columns.map( name => [ `column:${ name }`, name[ 0 ].toUpperCase() + name.slice( 1 ).replaceAll( '_', ' ' ) ] ), [ 'tile', 'Tile' ], [ 'level', 'Level of detail' ] ];
+
+	}
 
 	/** Colours by plain, color, height, tile, level, or column:NAME. */
 	colorBy( mode ) {
