@@ -34,9 +34,9 @@ impl Extent {
             max: [i32::MIN; 3],
         };
         for point in points {
-            for axis in 0..3 {
-                extent.min[axis] = extent.min[axis].min(point[axis]);
-                extent.max[axis] = extent.max[axis].max(point[axis]);
+            for (axis, x) in point.into_iter().enumerate() {
+                extent.min[axis] = extent.min[axis].min(x);
+                extent.max[axis] = extent.max[axis].max(x);
             }
         }
         extent

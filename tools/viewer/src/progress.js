@@ -13,11 +13,11 @@ export function told( part ) {
 
 	const what = part.kind === 'points' ? `Reading the points of ${ part.name }` : `Making levels of detail of ${ part.name }`;
 	if ( part.state === 'waiting' || ! part.work?.stage ) return { text: part.state === 'waiting' ? `${ part.name } comes next` : what, share: null };
-	const { stage, unit, done, total, share, left } = part.work;
-	const own = total ? done / total : null;
-	const many = total ? `${ Math.min( 100, Math.floor( 100 * own ) ) }\u2009%` : done ? `${ short( done ) } ${ unit }` : '';
-	const rest = left ? `about ${ time( left ) } left` : '';
-	return { text: `${ what }: ${ [ [ stage, many ].filter( Boolean ).join( ' ' ), rest ].filter( Boolean ).join( ', ' ) }`, share: share ?? own };
+	const { stage, unit, done, total, share, left } = part.work, percent = x => `${ Math.floor( 100 * Math.min( x, 1 ) ) }\u2009%`;
+	// Of the whole work, if its plan is known; else of the stage, or what was counted.
+	const known = share ?? ( total ? done / total : null );
+	const much = known !== null ? `${ percent( known ) } (${ stage })` : [ stage, done ? `${ short( done ) } ${ unit }` : '' ].filter( Boolean ).join( ', ' );
+	return { text: `${ what }: ${ much }${ left ? `, about ${ time( left ) } left` : '' }`, share: known };
 
 }
 
