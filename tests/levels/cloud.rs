@@ -55,8 +55,11 @@ fn made(
 
 const USUAL: (u64, usize) = (192 << 20, 2);
 
-/// The JSON of a tileset, and its points with their colours in linear light.
-fn read(folder: &Path) -> (Value, Vec<([f64; 3], Option<[u16; 3]>)>) {
+/// A position, and a colour in linear light.
+type Shown = ([f64; 3], Option<[u16; 3]>);
+
+/// The JSON of a tileset, and its points.
+fn read(folder: &Path) -> (Value, Vec<Shown>) {
     let json: Value =
         serde_json::from_slice(&std::fs::read(folder.join("tileset.json")).unwrap()).unwrap();
     let bytes =

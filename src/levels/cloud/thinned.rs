@@ -212,7 +212,8 @@ mod tests {
             let mut points: Vec<(Point, [u8; 3])> =
                 points.into_iter().map(|((x, y, z), c)| ([x, y, z], [c, 0, c])).collect();
             let one = thinned(most, &points);
-            points.sort_by_key(|(p, color)| (rank(seed.into() ^ (p[0] as u128) << 40 ^ (p[1] as u128) << 20), *color));
+            let mixed = |p: Point| p.iter().fold(Entry::from(seed), |x, c| x << 30 ^ Entry::from(c.unsigned_abs()));
+            points.sort_by_key(|(p, color)| (rank(mixed(*p)), *color));
             points.dedup();
             let other = thinned(most, &points);
             prop_assert_eq!(one.kept, other.kept);
