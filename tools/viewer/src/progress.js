@@ -49,7 +49,7 @@ export class Progress {
 
 			const bar = make( 'i' );
 			bar.style.width = `${ 100 * ( share ?? 0 ) }%`;
-			return make( 'div', {}, make( 'span', { textContent: text } ), make( 'b', {}, bar ) );
+			return make( 'div', {}, make( 'span', { textContent: text } ), make( 'b', { hidden: share === null }, bar ) );
 
 		} ) );
 
