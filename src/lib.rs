@@ -13,7 +13,7 @@
 //! # let points = (0..400).map(|n| format!("{} {} 0\n", n % 20, n / 20));
 //! # std::fs::write(&cloud, points.collect::<String>())?;
 //! let report = Reconstruction::builder()
-//!     .input(cloud) // LAS, LAZ, E57, PLY, PCD, PTX, OFF or text, or a folder
+//!     .input(cloud) // LAS, LAZ, EPT, E57, PLY, PCD, PTX, OFF or text, or a folder
 //!     .output(mesh) // PLY, OBJ, STL or GLB; or DIR/tileset.json
 //!     .params(Params { neighbors: 20, ..Params::default() })
 //!     .memory(256 << 20) // the ceiling, in bytes

@@ -293,7 +293,7 @@ pub struct SimplifyGoal {
 /// `outcrop compare`
 #[derive(Debug, ClapArgs)]
 pub struct Compare {
-    /// A mesh (PLY with faces) or a cloud (LAS, LAZ, E57, PLY, PCD, PTX, OFF, XYZ text, or a folder of them)
+    /// A mesh (PLY with faces) or a cloud (LAS, LAZ, EPT, E57, PLY, PCD, PTX, OFF, XYZ text, or a folder of them)
     #[arg(value_name = "A")]
     pub a: PathBuf,
     /// The mesh or cloud to compare it with

@@ -222,7 +222,7 @@ pub struct Coordinates {
 /// The points, the mesh, and what decides it.
 #[derive(Debug, ClapArgs)]
 pub struct Job {
-    /// Files (LAS, LAZ, E57, PLY, PCD, PTX, OFF, XYZ text; also as .gz, .zst and .zip) or folders of files; together they are one cloud
+    /// Files (LAS, LAZ, EPT, E57, PLY, PCD, PTX, OFF, XYZ text; also as .gz, .zst and .zip), folders of files, or URLs; together they are one cloud
     #[arg(value_name = "INPUT", required = true)]
     pub inputs: Vec<PathBuf>,
     /// The mesh to write: .ply, .obj, .stl or .glb (all but OBJ binary), compressed with .zst behind it; or
