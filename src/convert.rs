@@ -38,9 +38,6 @@ pub fn to_glb(
     let _held = workspace.reserve("convert: slices", MEMORY)?;
     let source = PlyMesh::open_any(mesh, workspace)?;
     let mut bounds = Bounds::new(mesh, source.vertices(), workspace);
-    if !source.vertices_first() {
-        return Err(bounds.error("faces before vertices", "vertices before faces"));
-    }
     source.read(&mut bounds)?;
 
     let source = PlyMesh::open_any(mesh, workspace)?;

@@ -114,11 +114,6 @@ impl Sink for Bounds<'_> {
         }
         self.workspace.check_cancel()
     }
-
-    fn non_triangles(&mut self, _: u64) -> Result<()> {
-        let found = format!("face {} without exactly three corners", self.seen);
-        Err(self.error(found, "triangles only"))
-    }
 }
 
 /// Writes the file, in the order in which the mesh comes.
@@ -207,9 +202,5 @@ impl Sink for Writer<'_> {
         self.format
             .put_triangles(&self.about, triangles, &self.placed, &mut self.bytes);
         self.put()
-    }
-
-    fn non_triangles(&mut self, _: u64) -> Result<()> {
-        Ok(())
     }
 }

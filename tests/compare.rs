@@ -377,7 +377,6 @@ fn bad_input_is_refused_in_one_line() {
     let vertices = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
     let body = |faces: &str| format!("{header}{vertices}{faces}\n");
     let cases = [
-        ("quad.ply", body("4 0 1 2 3"), "1 that are not triangles"),
         ("index.ply", body("3 0 1 4"), "a corner that is no vertex"),
         ("below.ply", body("3 0 1 -1"), "a corner that is no vertex"),
         ("cut.ply", format!("{header}{vertices}"), "face"),

@@ -1,6 +1,6 @@
 //! Streaming reader of triangle meshes in PLY files; see [`MeshStream`].
 
-use crate::foreign::{as_ply, is_foreign};
+use crate::foreign::{as_plain_ply, as_ply, is_foreign};
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::compressed::{Beginning, Content};
@@ -34,12 +34,6 @@ pub trait Sink {
     /// # Errors
     /// Any error; it ends the reading.
     fn triangles(&mut self, triangles: &[[u32; 3]]) -> Result<()>;
-
-    /// Counts `count` further faces without exactly three corners.
-    ///
-    /// # Errors
-    /// Any error; it ends the reading.
-    fn non_triangles(&mut self, count: u64) -> Result<()>;
 }
 
 /// A PLY mesh with a checked header.
@@ -115,24 +109,29 @@ impl PlyMesh {
         })
     }
 
-    /// As [`PlyMesh::open`], also for a compressed file, and for meshes in OBJ, STL and GLB; their content is read from
-    /// the scratch folder.
+    /// As [`PlyMesh::open`], also for a compressed file, and for meshes in OBJ, STL and GLB. A mesh that is not
+    /// in binary PLY, its vertices before its faces and these all triangles, is read from the scratch folder. So
+    /// it can be read at any place ([`PlyMesh::fixed`]), and all faces are triangles.
     ///
     /// # Errors
     /// See [`PlyMesh::open`] and [`Content::of`].
     pub fn open_any(path: &Path, workspace: &Workspace) -> Result<Self> {
         let content = Content::of(path, &is_mesh, workspace)?;
         let plain = content.as_ref().map_or(path, |content| &content.path);
-        if let Some(ply) = as_ply(path, plain, workspace)? {
-            let stream = MeshStream::open_as(&ply, path).map_err(converted)?;
-            let _content = None;
-            return Ok(Self { stream, _content });
-        }
-        let stream = MeshStream::open_as(plain, path).map_err(converted)?;
-        Ok(Self {
-            stream,
-            _content: content,
-        })
+        let ply = match as_ply(path, plain, workspace)? {
+            Some(ply) => ply,
+            None => {
+                let stream = MeshStream::open_as(plain, path).map_err(converted)?;
+                if stream.is_plain().map_err(converted)? {
+                    let _content = content;
+                    return Ok(Self { stream, _content });
+                }
+                as_plain_ply(path, plain, workspace)?
+            }
+        };
+        let stream = MeshStream::open_as(&ply, path).map_err(converted)?;
+        let _content = None;
+        Ok(Self { stream, _content })
     }
 
     /// Number of vertices; at most [`NO_VERTEX`], so that indices fit `u32`.
@@ -145,12 +144,6 @@ impl PlyMesh {
     #[must_use]
     pub fn faces(&self) -> u64 {
         self.stream.faces()
-    }
-
-    /// True if all vertices come before the first face.
-    #[must_use]
-    pub fn vertices_first(&self) -> bool {
-        self.stream.vertices_first()
     }
 
     /// The position of the cloud that is the origin of the mesh's coordinates, if its header gives one.
@@ -215,13 +208,19 @@ impl PlyMesh {
     /// Errors of the sink; [`Error::Io`]; [`Error::Input`] with the byte offset at which the file ends early
     /// or does not match its header.
     pub fn read(self, sink: &mut impl Sink) -> Result<()> {
+        let path = self.stream.path().to_path_buf();
+        // The size of a file may look as if all faces were triangles.
+        let polygon = |corners| {
+            let found = format!("one of {corners} corners");
+            Err(Error::input(&path, "faces", found, "triangles only"))
+        };
         let mut take = |part: Part<'_>| match part {
             Part::Vertices(positions) => sink.vertices(positions),
             Part::Values(values) => sink.values(values),
             Part::Triangles(triangles) => sink.triangles(triangles),
-            Part::NonTriangle => sink.non_triangles(1),
+            Part::Polygon(corners) => polygon(corners),
         };
-        let read = self.stream.read(|part| take(part).map_err(Failure));
+        let read = self.stream.read(|part| take(part).map_err(Failure::from));
         read.map_err(converted)
     }
 }
@@ -299,14 +298,16 @@ impl<S: Sink, P: Fn([f64; 3]) -> [f64; 3]> Sink for InPlace<'_, S, P> {
     fn triangles(&mut self, triangles: &[[u32; 3]]) -> Result<()> {
         self.sink.triangles(triangles)
     }
-
-    fn non_triangles(&mut self, count: u64) -> Result<()> {
-        self.sink.non_triangles(count)
-    }
 }
 
 /// An error as the reader returns it: its own, or that of a sink.
-struct Failure(Error);
+pub(crate) struct Failure(Error);
+
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        Self(error)
+    }
+}
 
 impl From<FileError> for Failure {
     fn from(error: FileError) -> Self {
@@ -321,7 +322,7 @@ impl From<FileError> for Failure {
     }
 }
 
-fn converted(error: impl Into<Failure>) -> Error {
+pub(crate) fn converted(error: impl Into<Failure>) -> Error {
     error.into().0
 }
 

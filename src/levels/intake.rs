@@ -257,16 +257,6 @@ impl<C: Stored> Sink for Reader<'_, C> {
         self.unit.advance(triangles.len() as u64);
         self.unit.check_cancel()
     }
-
-    fn non_triangles(&mut self, count: u64) -> Result<()> {
-        let found = format!("{count} that are not triangles");
-        Err(Error::input(
-            self.path,
-            "faces",
-            found,
-            "triangles; split them first",
-        ))
-    }
 }
 
 /// A vertex as it was read.

@@ -20,6 +20,7 @@ mod lattice;
 mod lengths;
 mod lossy;
 mod make;
+mod meet;
 mod nearest;
 mod node;
 pub mod outlook;
@@ -30,6 +31,7 @@ mod rows;
 mod shared;
 mod simplify;
 pub mod single;
+mod source;
 mod system;
 mod tree;
 mod writer;
@@ -52,7 +54,7 @@ use std::path::Path;
 /// Makes the tileset `folder` of the mesh `path`, which is called `source` in it.
 ///
 /// # Errors
-/// [`Error::Input`] for a file that is no mesh of triangles in PLY; [`Error::Memory`], [`Error::Io`],
+/// [`Error::Input`] for a file that is no mesh; [`Error::Memory`], [`Error::Io`],
 /// [`Error::Disk`], [`Error::Corrupt`], [`Error::Cancelled`].
 pub fn tileset(
     path: &Path,

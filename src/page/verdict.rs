@@ -68,11 +68,6 @@ fn cards(verdict: &Verdict) -> Markup {
 fn words(verdict: &Verdict) -> Vec<Advice> {
     let all = [
         (
-            verdict.non_triangles,
-            "faces have more or fewer than three corners.",
-            "Triangulate the mesh first.",
-        ),
-        (
             verdict.index_out_of_range,
             "triangles name a vertex that does not exist.",
             "The file is damaged, or was cut off.",

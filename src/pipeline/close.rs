@@ -29,7 +29,7 @@ pub struct Closing {
 }
 
 impl Closing {
-    /// Makes `output`, a mesh in any format that is written, of `mesh`, a PLY file.
+    /// Makes `output`, a mesh in any format that is written, of `mesh`, in any that is read.
     pub fn new(mesh: impl Into<PathBuf>, output: impl Into<PathBuf>) -> Self {
         Self {
             mesh: mesh.into(),
@@ -57,7 +57,7 @@ impl Closing {
     /// Makes the mesh.
     ///
     /// # Errors
-    /// [`Error::Input`] for a file that is no mesh of triangles in PLY; [`Error::Parameter`] for an output that makes
+    /// [`Error::Input`] for a file that is no mesh; [`Error::Parameter`] for an output that makes
     /// no sense, and for a floor that is not below the mesh; [`Error::Memory`] if the budget is too small;
     /// [`Error::Io`], [`Error::Disk`], [`Error::Corrupt`], [`Error::Cancelled`]; those of an unfinished run, as of
     /// [`crate::Reconstruction::run`].
@@ -355,9 +355,5 @@ impl<S: Fills> Sink for Appending<'_, S> {
     fn triangles(&mut self, triangles: &[[u32; 3]]) -> Result<()> {
         self.workspace.observer.advance(triangles.len() as u64);
         self.sink.triangles(triangles)
-    }
-
-    fn non_triangles(&mut self, count: u64) -> Result<()> {
-        self.sink.non_triangles(count)
     }
 }

@@ -22,7 +22,7 @@ pub struct Tiles {
 }
 
 impl Tiles {
-    /// Makes the tileset `folder` of `mesh`, a PLY file.
+    /// Makes the tileset `folder` of `mesh`, in any format that is read.
     pub fn new(mesh: impl Into<PathBuf>, folder: impl Into<PathBuf>) -> Self {
         Self {
             mesh: mesh.into(),
@@ -50,7 +50,7 @@ impl Tiles {
     /// Makes the tileset.
     ///
     /// # Errors
-    /// [`crate::Error::Input`] for a file that is no mesh of triangles in PLY; [`crate::Error::Parameter`] if the folder has other
+    /// [`crate::Error::Input`] for a file that is no mesh; [`crate::Error::Parameter`] if the folder has other
     /// files; [`crate::Error::Memory`] if the budget is too small; [`crate::Error::Io`], [`crate::Error::Disk`], [`crate::Error::Corrupt`],
     /// [`crate::Error::Cancelled`]; those of an unfinished run, as of [`crate::Reconstruction::run`].
     pub fn run(&self) -> Result<TilesReport> {

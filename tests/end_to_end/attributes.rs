@@ -111,7 +111,7 @@ fn every_vertex_has_the_smallest_values_at_its_position() {
         for (place, [r, g, b, level]) in &found {
             assert_eq!([*level, *r, *g, *b], least[place], "{place:?}");
         }
-        assert_eq!(util::verdict(&mesh).defects().map(|d| d.1), [0; 9]);
+        assert_eq!(util::verdict(&mesh).defects().map(|d| d.1), [0; 8]);
         assert_eq!(report.attributes.len(), 4);
         std::fs::remove_file(&mesh).unwrap();
     }

@@ -356,7 +356,7 @@ fn what_makes_no_sense_is_refused() {
     std::fs::write(at("far.ply"), quads.replace("4 0 1 2 3", "3 0 1 9")).unwrap();
     std::fs::write(at("none.ply"), quads.replace("4 0 1 2 3", "3 0 1 1")).unwrap();
     std::fs::write(at("nan.ply"), quads.replace("1 1 0\n", "1 nan 0\n")).unwrap();
-    for name in ["quads.ply", "far.ply", "none.ply", "nan.ply"] {
+    for name in ["far.ply", "none.ply", "nan.ply"] {
         let error = refused(name, "small.ply", Goal::Ratio(0.5));
         assert!(matches!(error, Error::Input { .. }), "{name}: {error}");
         assert!(!at("small.ply").exists());

@@ -29,7 +29,6 @@ pub struct Counts {
     pub pinched_vertices: u64,
     pub index_out_of_range: u64,
     pub non_finite_vertices: u64,
-    pub non_triangles: u64,
     pub manifold: bool,
 }
 
@@ -97,26 +96,25 @@ fn is_one_fan(
 fn sort_out(mesh: &Mesh, counts: &mut Counts) -> Vec<[usize; 3]> {
     let mut sound = Vec::new();
     for face in &mesh.faces {
-        let [x, y, z] = match face.as_slice() {
-            &[x, y, z] => [x, y, z],
-            _ => {
-                counts.non_triangles += 1;
-                continue;
-            }
-        };
-        counts.triangles += 1;
-        if [x, y, z]
-            .iter()
-            .any(|&i| i < 0 || i >= mesh.positions.len() as i64)
-        {
-            counts.index_out_of_range += 1;
-        } else if x == y || y == z || x == z {
-            counts.degenerate_triangles += 1;
-        } else {
-            sound.push([x as usize, y as usize, z as usize]);
+        for pair in face.windows(2).skip(1) {
+            sort_in([face[0], pair[0], pair[1]], mesh, counts, &mut sound);
         }
     }
     sound
+}
+
+fn sort_in([x, y, z]: [i64; 3], mesh: &Mesh, counts: &mut Counts, sound: &mut Vec<[usize; 3]>) {
+    counts.triangles += 1;
+    if [x, y, z]
+        .iter()
+        .any(|&i| i < 0 || i >= mesh.positions.len() as i64)
+    {
+        counts.index_out_of_range += 1;
+    } else if x == y || y == z || x == z {
+        counts.degenerate_triangles += 1;
+    } else {
+        sound.push([x as usize, y as usize, z as usize]);
+    }
 }
 
 /// Counts everything.
@@ -169,8 +167,7 @@ pub fn check(mesh: &Mesh) -> Counts {
     let (parts, loops) = (connected(&links), connected(&border));
     counts.components = parts.len() as u64;
     counts.boundary_loops = loops.len() as u64;
-    let surface_defects = counts.non_triangles
-        + counts.index_out_of_range
+    let surface_defects = counts.index_out_of_range
         + counts.degenerate_triangles
         + counts.repeated_triangles
         + counts.non_manifold_edges

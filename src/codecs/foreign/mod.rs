@@ -1,10 +1,12 @@
-//! Meshes in other formats than PLY: each is read once, in bounded memory, into a PLY file in the scratch folder,
-//! which is then read like any other.
+//! Meshes that are not read where they are: each is read once, in bounded memory, into a PLY file in the scratch
+//! folder, binary and of triangles, which is then read like any other.
 
 mod glb;
 mod obj;
+mod ply;
 mod spool;
 mod stl;
+mod stream;
 #[cfg(test)]
 mod tests;
 mod weld;
@@ -15,7 +17,7 @@ use outcrop_disk::workspace::compressed::plain_name;
 use spool::Spool;
 use std::fs::File;
 use std::hash::{DefaultHasher, Hash, Hasher};
-use std::os::unix::fs::FileExt;
+use std::os::unix::fs::{FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
 /// A format.
@@ -54,7 +56,34 @@ struct Mesh<'a> {
     workspace: &'a Workspace,
 }
 
-impl Mesh<'_> {
+impl<'a> Mesh<'a> {
+    fn open(shown: &'a Path, content: &Path, workspace: &'a Workspace) -> Result<Self> {
+        let io = |action: &'static str| move |e| Error::io(shown, action, e);
+        let file = File::open(content).map_err(io("open"))?;
+        let bytes = file.metadata().map_err(io("read the size of"))?.len();
+        Ok(Self {
+            shown,
+            file,
+            bytes,
+            workspace,
+        })
+    }
+
+    /// The PLY file that `read` fills, or has filled before.
+    fn spooled(&self, read: impl FnOnce(&mut Spool<'_>) -> Result<()>) -> Result<PathBuf> {
+        let about = std::fs::metadata(self.shown);
+        let about = about.map_err(|e| Error::io(self.shown, "read the size of", e))?;
+        let mut hasher = DefaultHasher::new();
+        (self.shown, about.len(), about.mtime(), about.mtime_nsec()).hash(&mut hasher);
+        let name = format!("mesh-{:016x}", hasher.finish());
+        if let Some(path) = spool::finished(&name, self.workspace)? {
+            return Ok(path);
+        }
+        let mut spool = Spool::new(self, &name)?;
+        read(&mut spool)?;
+        spool.finish()
+    }
+
     fn error(&self, place: impl Into<String>, found: impl Into<String>, expected: &str) -> Error {
         Error::input(self.shown, place, found, expected)
     }
@@ -70,39 +99,36 @@ impl Mesh<'_> {
 }
 
 /// The PLY file in the scratch folder with the mesh of the file `shown`, whose content, if that was compressed, is in
-/// the file `content`; none if that is in none of the formats here. A mesh is read once in a workspace.
+/// the file `content`; none if that is in none of the formats here. A mesh is read once in a workspace, unless its file changes.
 ///
 /// # Errors
 /// [`Error::Input`] if it is damaged or has what is not read; [`Error::TooLarge`]; [`Error::Memory`], [`Error::Disk`],
 /// [`Error::Io`], [`Error::Cancelled`].
 pub fn as_ply(shown: &Path, content: &Path, workspace: &Workspace) -> Result<Option<PathBuf>> {
-    let io = |action: &'static str| move |e| Error::io(shown, action, e);
-    let file = File::open(content).map_err(io("open"))?;
-    let bytes = file.metadata().map_err(io("read the size of"))?.len();
+    let mesh = Mesh::open(shown, content, workspace)?;
     let mut head = [0; 4];
-    let known = head.len().min(bytes as usize);
-    file.read_exact_at(&mut head[..known], 0)
-        .map_err(io("read"))?;
+    let known = head.len().min(mesh.bytes as usize);
+    let read = mesh.file.read_exact_at(&mut head[..known], 0);
+    read.map_err(|e| Error::io(shown, "read", e))?;
     let Some(format) = format(shown, &head[..known]) else {
         return Ok(None);
     };
-    let mut hasher = DefaultHasher::new();
-    shown.hash(&mut hasher);
-    let name = format!("mesh-{:016x}", hasher.finish());
-    if let Some(path) = spool::finished(&name, workspace)? {
-        return Ok(Some(path));
-    }
-    let mesh = Mesh {
-        shown,
-        file,
-        bytes,
-        workspace,
-    };
-    let mut spool = Spool::new(&mesh, &name)?;
-    match format {
-        Format::Obj => obj::read(&mesh, &mut spool)?,
-        Format::Stl => stl::read(&mesh, &mut spool)?,
-        Format::Glb => glb::read(&mesh, &mut spool)?,
-    }
-    spool.finish().map(Some)
+    let ply = mesh.spooled(|spool| {
+        match format {
+            Format::Obj => obj::read(&mesh, spool)?,
+            Format::Stl => stl::read(&mesh, spool)?,
+            Format::Glb => glb::read(&mesh, spool)?,
+        }
+        spool.check_content()
+    })?;
+    Ok(Some(ply))
+}
+
+/// As [`as_ply`], of a mesh in PLY that is not read where it is.
+///
+/// # Errors
+/// See [`as_ply`].
+pub fn as_plain_ply(shown: &Path, content: &Path, workspace: &Workspace) -> Result<PathBuf> {
+    let mesh = Mesh::open(shown, content, workspace)?;
+    mesh.spooled(|spool| ply::read(&mesh, content, spool))
 }

@@ -1,20 +1,15 @@
 //! Vertices and triangles as they come, and the PLY file that they become.
 
 use super::Mesh;
+use super::stream::{CHUNK, Stream};
 use outcrop_disk::error::{Error, Result};
-use outcrop_disk::workspace::file::ScratchFile;
+use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::memory::Reservation;
-use outcrop_disk::workspace::place::Place;
-use outcrop_disk::workspace::{Files, Workspace};
 use outcrop_ply::{Encoding, Layout, NO_VERTEX, Scalar, TRIANGLE, put_triangle};
 use std::path::PathBuf;
-use std::sync::Arc;
 
-/// Bytes that are written or read at a time.
-const CHUNK: usize = 1 << 20;
-
-/// Bytes of a vertex on the way: a position and a colour.
-const VERTEX: usize = 3 * 8 + 3;
+/// Bytes of a position on the way; the values of the vertex follow it.
+const POSITION: usize = 3 * 8;
 
 /// The material of a vertex that no triangle has, or of a triangle without one.
 pub(super) const NO_MATERIAL: u16 = u16::MAX;
@@ -23,80 +18,7 @@ pub(super) const NO_MATERIAL: u16 = u16::MAX;
 const WHITE: [u8; 3] = [255; 3];
 
 /// The names of colours in PLY.
-const COLOURS: [(&str, Scalar); 3] = [
-    ("red", Scalar::U8),
-    ("green", Scalar::U8),
-    ("blue", Scalar::U8),
-];
-
-/// Bytes that are appended to a scratch file chunk by chunk, from one thread.
-struct Stream {
-    file: Arc<ScratchFile>,
-    name: String,
-    files: Files,
-    buffer: Vec<u8>,
-    begin: Option<Place>,
-    bytes: u64,
-}
-
-impl Stream {
-    fn new(name: String, workspace: &Workspace) -> Result<Self> {
-        Ok(Self {
-            file: workspace.files.open(&name, false)?,
-            name,
-            files: workspace.files.clone(),
-            buffer: Vec::with_capacity(CHUNK + TRIANGLE.max(VERTEX)),
-            begin: None,
-            bytes: 0,
-        })
-    }
-
-    fn push(&mut self, bytes: &[u8]) -> Result<()> {
-        self.buffer.extend_from_slice(bytes);
-        if self.buffer.len() >= CHUNK {
-            self.flush()?;
-        }
-        Ok(())
-    }
-
-    fn flush(&mut self) -> Result<()> {
-        let place = self.file.append(self.files.worker(), &self.buffer, 0)?;
-        if !self.buffer.is_empty() {
-            self.begin.get_or_insert(place);
-        }
-        self.bytes += self.buffer.len() as u64;
-        self.buffer.clear();
-        Ok(())
-    }
-
-    /// Passes on what was written, in chunks of whole records of `record` bytes.
-    fn read(
-        &self,
-        record: usize,
-        workspace: &Workspace,
-        mut take: impl FnMut(&[u8]) -> Result<()>,
-    ) -> Result<()> {
-        let Some(begin) = self.begin else {
-            return Ok(());
-        };
-        let chunk = (CHUNK / record * record) as u64;
-        let mut bytes = Vec::new();
-        let mut at = 0;
-        while at < self.bytes {
-            workspace.check_cancel()?;
-            bytes.resize(chunk.min(self.bytes - at) as usize, 0);
-            self.file
-                .read(begin.segment, begin.offset + at, &mut bytes)?;
-            take(&bytes)?;
-            at += bytes.len() as u64;
-        }
-        Ok(())
-    }
-
-    fn release(self) -> Result<()> {
-        self.files.release(&self.name)
-    }
-}
+const COLOURS: [&str; 3] = ["red", "green", "blue"];
 
 /// The finished file `name` of this workspace, if there is one.
 pub(super) fn finished(name: &str, workspace: &Workspace) -> Result<Option<PathBuf>> {
@@ -114,13 +36,19 @@ pub(super) struct Spool<'a> {
     pub name: String,
     vertices: Stream,
     triangles: Stream,
-    /// Material of each triangle.
+    /// Material of each triangle up to the last one that has any.
     materials: Stream,
+    material_count: u64,
     /// The colour of each material, if it has one.
     pub palette: Vec<Option<[u8; 3]>>,
     /// Coordinates are written as 32-bit floats.
     pub floats: bool,
-    has_colours: bool,
+    /// Comments of the file that is written.
+    pub comments: Vec<String>,
+    /// Names and types of the values of vertices: colours, unless a format has others. They are set before the
+    /// first vertex.
+    pub columns: Vec<(String, Scalar)>,
+    has_values: bool,
     vertex_count: u64,
     triangle_count: u64,
     /// Faces with more than three corners.
@@ -142,9 +70,12 @@ impl<'a> Spool<'a> {
             vertices: stream("vertices")?,
             triangles: stream("triangles")?,
             materials: stream("materials")?,
+            material_count: 0,
             palette: Vec::new(),
             floats: false,
-            has_colours: false,
+            comments: Vec::new(),
+            columns: COLOURS.map(|name| (name.to_owned(), Scalar::U8)).into(),
+            has_values: false,
             vertex_count: 0,
             triangle_count: 0,
             polygons: 0,
@@ -161,32 +92,51 @@ impl<'a> Spool<'a> {
 
     /// Takes the next vertex. A mesh in which one vertex has a colour has colours.
     pub fn vertex(&mut self, position: [f64; 3], colour: Option<[u8; 3]>) -> Result<()> {
-        let mut bytes = [0; VERTEX];
-        for (axis, x) in position.iter().enumerate() {
-            bytes[8 * axis..8 * axis + 8].copy_from_slice(&x.to_le_bytes());
-        }
-        bytes[24..].copy_from_slice(&colour.unwrap_or(WHITE));
-        self.has_colours |= colour.is_some();
+        self.has_values |= colour.is_some();
+        self.put_vertex(position, &colour.unwrap_or(WHITE))
+    }
+
+    /// Takes the next vertex, with the values of the columns.
+    pub fn vertex_with(&mut self, position: [f64; 3], values: &[u8]) -> Result<()> {
+        self.has_values = true;
+        self.put_vertex(position, values)
+    }
+
+    fn put_vertex(&mut self, position: [f64; 3], values: &[u8]) -> Result<()> {
         self.vertex_count += 1;
         if self.vertex_count > u64::from(NO_VERTEX) {
             let found = format!("more than {NO_VERTEX}");
             let expected = format!("at most {NO_VERTEX}, which 32-bit numbers can name");
             return Err(self.mesh.error("vertices", found, &expected));
         }
-        self.vertices.push(&bytes)
+        for x in position {
+            self.vertices.push(&x.to_le_bytes())?;
+        }
+        self.vertices.push(values)
+    }
+
+    /// Bytes of a vertex on the way.
+    fn vertex_bytes(&self) -> usize {
+        let values = self.columns.iter().map(|(_, scalar)| scalar.bytes());
+        POSITION + values.sum::<usize>()
     }
 
     /// Takes the next face, which is divided into triangles from its first corner.
     pub fn face(&mut self, corners: &[u32], material: u16) -> Result<()> {
-        match corners.len() {
-            0..3 => self.lines += 1,
-            3 => {}
-            _ => self.polygons += 1,
-        }
+        self.count(corners.len() as u64);
         for pair in corners.windows(2).skip(1) {
             self.triangle([corners[0], pair[0], pair[1]], material)?;
         }
         Ok(())
+    }
+
+    /// Takes note of a face with this number of corners.
+    pub fn count(&mut self, corners: u64) {
+        match corners {
+            0..3 => self.lines += 1,
+            3 => {}
+            _ => self.polygons += 1,
+        }
     }
 
     /// Takes the next triangle.
@@ -194,45 +144,38 @@ impl<'a> Spool<'a> {
         let mut bytes = Vec::with_capacity(TRIANGLE);
         put_triangle(corners, &mut bytes);
         self.triangles.push(&bytes)?;
-        self.materials.push(&material.to_le_bytes())?;
+        if material != NO_MATERIAL {
+            while self.material_count < self.triangle_count {
+                self.materials.push(&NO_MATERIAL.to_le_bytes())?;
+                self.material_count += 1;
+            }
+            self.materials.push(&material.to_le_bytes())?;
+            self.material_count += 1;
+        }
         self.triangle_count += 1;
         Ok(())
     }
 
+    /// Refuses a file without a mesh.
+    pub fn check_content(&self) -> Result<()> {
+        let (vertices, triangles) = (self.vertex_count, self.triangle_count);
+        if vertices > 0 && triangles > 0 {
+            return Ok(());
+        }
+        let found = format!("{vertices} vertices and {triangles} triangles");
+        Err(self.mesh.error("content", found, "a mesh"))
+    }
+
     /// Writes the PLY file, and says what of the mesh is not in it.
     pub fn finish(mut self) -> Result<PathBuf> {
-        if self.vertex_count == 0 || self.triangle_count == 0 {
-            let found = format!(
-                "{} vertices and {} triangles",
-                self.vertex_count, self.triangle_count
-            );
-            return Err(self.mesh.error("content", found, "a mesh"));
-        }
         [&mut self.vertices, &mut self.triangles, &mut self.materials]
             .into_iter()
             .try_for_each(Stream::flush)?;
         self.tell();
-        let is_painted = !self.has_colours && self.palette.iter().any(Option::is_some);
-        let columns = if self.has_colours || is_painted {
-            &COLOURS[..]
-        } else {
-            &[]
-        };
-        let layout = Layout {
-            encoding: Encoding::Little,
-            comments: &[],
-            vertices: self.vertex_count,
-            coordinates: if self.floats {
-                Scalar::F32
-            } else {
-                Scalar::F64
-            },
-            columns,
-            triangles: Some((self.triangle_count, Scalar::U32)),
-        };
+        let is_painted = !self.has_values && self.palette.iter().any(Option::is_some);
         let workspace = self.mesh.workspace;
         let mut out = Stream::new(self.name.clone(), workspace)?;
-        out.push(layout.header().as_bytes())?;
+        out.push(self.header(is_painted).as_bytes())?;
         match is_painted {
             true => self.paint(&mut out)?,
             false => self.write_vertices(&mut out)?,
@@ -242,9 +185,25 @@ impl<'a> Spool<'a> {
         self.triangles
             .read(TRIANGLE, workspace, |bytes| out.push(bytes))?;
         self.triangles.release()?;
-        out.flush()?;
-        let segment = out.begin.map_or(0, |place| place.segment);
-        Ok(out.file.path(segment))
+        out.finish()
+    }
+
+    fn header(&self, is_painted: bool) -> String {
+        let columns = self.columns.iter().map(|(name, scalar)| (&**name, *scalar));
+        let columns = columns.filter(|_| self.has_values || is_painted);
+        let comments = self.comments.iter().map(|comment| &**comment);
+        let layout = Layout {
+            encoding: Encoding::Little,
+            comments: &comments.collect::<Vec<_>>(),
+            vertices: self.vertex_count,
+            coordinates: match self.floats {
+                true => Scalar::F32,
+                false => Scalar::F64,
+            },
+            columns: &columns.collect::<Vec<_>>(),
+            triangles: Some((self.triangle_count, Scalar::U32)),
+        };
+        layout.header()
     }
 
     fn tell(&mut self) {
@@ -268,26 +227,26 @@ impl<'a> Spool<'a> {
 
     /// Appends a vertex to the file.
     fn put(&self, vertex: &[u8], colour: Option<[u8; 3]>, bytes: &mut Vec<u8>) {
+        let (position, values) = vertex.split_at(POSITION);
         match self.floats {
             true => {
-                for x in vertex[..24].chunks_exact(8) {
-                    let x = f64::from_le_bytes(x.try_into().unwrap_or_default());
-                    bytes.extend((x as f32).to_le_bytes());
+                for x in position.as_chunks().0 {
+                    bytes.extend((f64::from_le_bytes(*x) as f32).to_le_bytes());
                 }
             }
-            false => bytes.extend_from_slice(&vertex[..24]),
+            false => bytes.extend_from_slice(position),
         }
         match colour {
             Some(colour) => bytes.extend(colour),
-            None if self.has_colours => bytes.extend_from_slice(&vertex[24..]),
+            None if self.has_values => bytes.extend_from_slice(values),
             None => {}
         }
     }
 
     fn write_vertices(&self, out: &mut Stream) -> Result<()> {
-        let mut one = Vec::with_capacity(VERTEX);
-        self.vertices.read(VERTEX, self.mesh.workspace, |vertices| {
-            vertices.chunks_exact(VERTEX).try_for_each(|vertex| {
+        let (size, mut one) = (self.vertex_bytes(), Vec::new());
+        self.vertices.read(size, self.mesh.workspace, |vertices| {
+            vertices.chunks_exact(size).try_for_each(|vertex| {
                 one.clear();
                 self.put(vertex, None, &mut one);
                 out.push(&one)
@@ -305,9 +264,9 @@ impl<'a> Spool<'a> {
         let _held = workspace.reserve("mesh: materials", 2 * range as u64)?;
         let mut of_range = Vec::new();
         let (mut begin, mut at) = (0, 0);
-        let mut one = Vec::with_capacity(VERTEX);
-        self.vertices.read(VERTEX, workspace, |vertices| {
-            vertices.chunks_exact(VERTEX).try_for_each(|vertex| {
+        let (size, mut one) = (self.vertex_bytes(), Vec::new());
+        self.vertices.read(size, workspace, |vertices| {
+            vertices.chunks_exact(size).try_for_each(|vertex| {
                 if at == begin + of_range.len() {
                     begin = at;
                     self.materials_of(begin, range.min(all - begin), &mut of_range)?;
@@ -327,16 +286,11 @@ impl<'a> Spool<'a> {
         let workspace = self.mesh.workspace;
         of.clear();
         of.resize(count, NO_MATERIAL);
-        let mut at = 0;
+        let (mut at, mut materials) = (0, Vec::new());
         self.triangles.read(TRIANGLE, workspace, |triangles| {
-            let Some(first) = self.materials.begin else {
-                return Ok(());
-            };
-            let mut materials = vec![0; 2 * (triangles.len() / TRIANGLE)];
-            self.materials
-                .file
-                .read(first.segment, first.offset + at, &mut materials)?;
-            at += materials.len() as u64;
+            let count = triangles.len() / TRIANGLE;
+            self.materials.read_at(at, &mut materials, 2 * count)?;
+            at += 2 * count as u64;
             let materials = materials.chunks_exact(2);
             for (triangle, material) in triangles.chunks_exact(TRIANGLE).zip(materials) {
                 let material = u16::from_le_bytes([material[0], material[1]]);

@@ -149,10 +149,6 @@ impl Sink for Joined<'_> {
         self.sorter.push(&self.batch)?;
         self.reading.advance(triangles.len())
     }
-
-    fn non_triangles(&mut self, count: u64) -> Result<()> {
-        Err(self.reading.not_triangles(count))
-    }
 }
 
 /// All corners by vertex; they can be read more than once.

@@ -49,7 +49,7 @@ fn read_with(
     };
     let observer = &workspace.observer;
     let bytes = reading.vertices * VERTEX;
-    let small = bytes <= workspace.memory.available() / 4 && mesh.vertices_first();
+    let small = bytes <= workspace.memory.available() / 4;
     let total = reading.vertices + reading.faces;
     observer.begin("read mesh", "vertices and faces", total);
     if small {
@@ -66,7 +66,7 @@ fn read_with(
     }
 }
 
-/// Reads a mesh without the faces that cannot be drawn: those that are no triangles, or have corners that do not
+/// Reads a mesh without the faces that cannot be drawn: those with corners that do not
 /// exist or are not finite.
 #[cfg(feature = "pictures")]
 pub(super) fn read_sound(
@@ -125,16 +125,9 @@ impl<S: Sink> Sink for Sieve<'_, S> {
         sound.batch.extend(all);
         self.0.triangles(&sound.batch)
     }
-
-    fn non_triangles(&mut self, count: u64) -> Result<()> {
-        match &self.1 {
-            Some(_) => Ok(()),
-            None => self.0.non_triangles(count),
-        }
-    }
 }
 
-/// Reads a mesh whose vertices fit into memory and precede the faces.
+/// Reads a mesh whose vertices fit into memory.
 struct Direct<'a> {
     reading: Reading<'a>,
     sorter: Sorter<KeyedTriangle>,
@@ -190,9 +183,5 @@ impl Sink for Direct<'_> {
         }
         self.sorter.push(&self.batch)?;
         self.reading.advance(triangles.len())
-    }
-
-    fn non_triangles(&mut self, count: u64) -> Result<()> {
-        Err(self.reading.not_triangles(count))
     }
 }

@@ -80,12 +80,6 @@ impl Reading<'_> {
         self.workspace.check_cancel()
     }
 
-    /// The error for faces that do not have three corners.
-    pub(super) fn not_triangles(&self, count: u64) -> Error {
-        let found = format!("{count} that are not triangles");
-        Error::input(self.path, "faces", found, "triangles; split them first")
-    }
-
     /// The error for a corner whose index is no vertex.
     pub(super) fn no_vertex(&self) -> Error {
         let expected = format!("vertices below {}", self.vertices);

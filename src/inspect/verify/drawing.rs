@@ -62,10 +62,6 @@ impl Sink for Pick<'_> {
     fn triangles(&mut self, _: &[[u32; 3]]) -> Result<()> {
         self.workspace.check_cancel()
     }
-
-    fn non_triangles(&mut self, _: u64) -> Result<()> {
-        Ok(())
-    }
 }
 
 /// Draws the mesh with the places of its defects.

@@ -135,10 +135,4 @@ impl Sink for Intake<'_> {
         self.workspace.observer.advance(triangles.len() as u64);
         Ok(())
     }
-
-    fn non_triangles(&mut self, count: u64) -> Result<()> {
-        self.verdict.non_triangles += count;
-        self.workspace.observer.advance(count);
-        Ok(())
-    }
 }

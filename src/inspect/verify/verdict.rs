@@ -13,8 +13,6 @@ pub struct Verdict {
     /// True if the mesh has none of the defects. Zero-area triangles are no defect, nor are unreferenced
     /// vertices if they were allowed.
     pub manifold: bool,
-    /// Defect: faces that do not have exactly three corners.
-    pub non_triangles: u64,
     /// Defect: triangles with an index that is no vertex of the file.
     pub index_out_of_range: u64,
     /// Defect: triangles with existing corners, two of which are the same vertex.
@@ -38,7 +36,7 @@ pub struct Verdict {
     pub zero_area_triangles: u64,
     /// Vertices in the file.
     pub vertices: u64,
-    /// Faces with three corners in the file, sound or not.
+    /// Triangles in the file, sound or not; polygons count as the triangles that they are divided into.
     pub triangles: u64,
     /// Edges of sound triangles.
     pub edges: u64,
@@ -73,8 +71,7 @@ impl Verdict {
         let sound = self.triangles - unsound;
         let referenced = self.vertices - self.unreferenced_vertices;
         let euler = referenced as i64 - self.edges as i64 + sound as i64;
-        let surface_defects = self.non_triangles
-            + unsound
+        let surface_defects = unsound
             + self.repeated_triangles
             + self.non_manifold_edges
             + self.inconsistent_edges
@@ -105,13 +102,12 @@ impl Verdict {
 
     /// Name and number of every defect, 0 included.
     #[must_use]
-    pub fn defects(&self) -> [(&'static str, u64); 9] {
+    pub fn defects(&self) -> [(&'static str, u64); 8] {
         let unreferenced = match self.unreferenced_allowed {
             true => 0,
             false => self.unreferenced_vertices,
         };
         [
-            ("faces that are not triangles", self.non_triangles),
             (
                 "triangles with an index out of range",
                 self.index_out_of_range,

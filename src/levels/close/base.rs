@@ -4,7 +4,7 @@ use super::Kind;
 use super::ears::clip;
 use super::lid::{Loop, Patch};
 use super::near::{Near, Placed};
-use super::source::{PAGE, RANGE, READER, Source};
+use crate::source::{PAGE, RANGE, READER, Source};
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::Workspace;
 use outcrop_geom::vector::V3;

@@ -3,13 +3,12 @@
 //! A tree over the boxes of the triangles of as many patches as fit is asked for every triangle of the mesh and of all
 //! patches. So the mesh is read once for each part of the patches, usually once.
 
-use super::meet::{Corners, cross_each_other};
 use super::patches::Patches;
-use super::source::{READER, Source};
+use crate::meet::{Corners, bounds, cross_each_other};
+use crate::source::{READER, Source};
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::Workspace;
 use outcrop_geom::boxes::BoxTree;
-use outcrop_geom::vector::Box3;
 use std::collections::BTreeMap;
 
 /// Triangles of patches that are in memory at a time, unless a batch has more.
@@ -23,11 +22,6 @@ struct Part {
     numbers: Vec<u32>,
     triangles: Vec<Corners>,
     tree: BoxTree<f64>,
-}
-
-fn bounds(t: &Corners) -> [[f64; 3]; 2] {
-    let all = Box3::of(t);
-    [all.min, all.max]
 }
 
 impl Part {

@@ -1,6 +1,6 @@
 //! Ear clipping of a loop in a plane, the shortest chords first, so that the triangles grow evenly towards the middle.
 
-use super::meet::norm;
+use crate::meet::norm;
 use outcrop_geom::vector::{V3, cross, sub};
 use rustc_hash::FxHashSet;
 use std::cmp::Reverse;

@@ -3,7 +3,7 @@
 //! it, in double precision, one thread for a patch, so that the result is the same everywhere.
 
 use super::lid::Loop;
-use super::meet::norm;
+use crate::meet::norm;
 use outcrop_geom::vector::{V3, cross, dot, sub};
 
 /// Least weight of an edge, as a cotangent: obtuse triangles would pull the wrong way.

@@ -1,7 +1,7 @@
 //! A loop closed without new vertices: by the triangulation of least weight if it is short, else by ears.
 
 use super::ears::clip;
-use super::meet::norm;
+use crate::meet::norm;
 use outcrop_geom::vector::{V3, add, cross, dot, scale, sub};
 
 /// Longest loop whose triangulation of least weight is sought: its time grows with the cube of the length. At 100 it

@@ -2,8 +2,8 @@
 
 use super::fair::{Ring, fair};
 use super::lid::{Loop, Patch, lid};
-use super::meet::norm;
 use super::refine::Net;
+use crate::meet::norm;
 use outcrop_geom::vector::{cross, sub};
 
 /// Longest loop that is closed smoothly: the time grows with the square of the length.

@@ -2,7 +2,7 @@
 //!
 //! The boundary (`rim`) is linked to loops (`loops`); with the triangles around them (`near`) they are closed batch by
 //! batch (`patches`): without new vertices (`lid`, `ears`), by a thin plate (`membrane`: `refine`, `fair`), or by walls
-//! and a floor (`base`). Patches that cross the mesh (`crossings`, `meet`) are made again as lids. Nothing depends on
+//! and a floor (`base`). Patches that cross the mesh (`crossings`) are made again as lids. Nothing depends on
 //! memory or threads, so neither does the mesh.
 
 mod base;
@@ -11,21 +11,19 @@ mod ears;
 mod fair;
 mod lid;
 mod loops;
-mod meet;
 mod membrane;
 mod near;
 mod patches;
 mod refine;
 mod rim;
 mod rows;
-mod source;
 
+use crate::source::Source;
 use base::Base;
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::Workspace;
 use patches::{Closing, Patches, Shape, Wish};
 use serde::{Deserialize, Serialize};
-use source::Source;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -131,7 +129,7 @@ pub struct Closure {
 /// Closes a mesh.
 ///
 /// # Errors
-/// [`outcrop_disk::error::Error::Input`] for a file that is no mesh of triangles in PLY;
+/// [`outcrop_disk::error::Error::Input`] for a file that is no mesh;
 /// [`outcrop_disk::error::Error::Parameter`] for a floor that is not below the mesh; errors of memory and files.
 pub fn close(path: &Path, kind: Kind, workspace: &Workspace) -> Result<Closure> {
     let source = Source::open(path, workspace)?;

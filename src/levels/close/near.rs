@@ -4,7 +4,7 @@ use super::fair::Ring;
 use super::lid::Loop;
 use super::loops::{Batch, Loops};
 use super::rows::{LoopVertex, NearTriangle};
-use super::source::{READER, Source};
+use crate::source::{READER, Source};
 use outcrop_disk::error::Result;
 use outcrop_disk::spill::{Inbox, Shuffle};
 use outcrop_disk::workspace::{Unit, Workspace};

@@ -2,11 +2,11 @@
 
 use super::base::{Base, block};
 use super::lid::{Loop, Patch, TAUT, lid, taut};
-use super::meet::norm;
 use super::membrane::{self, membrane};
 use super::near::{Near, Placed};
 use super::rows::{NewVertex, PatchTriangle, PlacedPatch};
 use super::{Kind, Way};
+use crate::meet::norm;
 use outcrop_disk::error::Result;
 use outcrop_disk::spill::Table;
 use outcrop_disk::workspace::{Unit, Workspace};

@@ -2,7 +2,7 @@
 //! no pair of triangles has opposite angles of more than 180 degrees.
 
 use super::lid::{Loop, Patch};
-use super::meet::norm;
+use crate::meet::norm;
 use outcrop_geom::vector::{V3, add, cross, dot, scale, sub};
 use rustc_hash::FxHashSet;
 

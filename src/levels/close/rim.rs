@@ -5,7 +5,7 @@
 //! cancel at once; what is left of all ranges is sorted by edge.
 
 use super::rows::{NetEdge, RimEdge};
-use super::source::{RANGE, READER, Source};
+use crate::source::{RANGE, READER, Source};
 use outcrop_disk::error::Result;
 use outcrop_disk::spill::{Sorter, Table};
 use outcrop_disk::workspace::Workspace;

@@ -163,10 +163,6 @@ impl<S: Sink> Sink for Whole<S> {
         self.left_out += (triangles.len() - self.batch.len()) as u64;
         self.sink.triangles(&self.batch)
     }
-
-    fn non_triangles(&mut self, count: u64) -> Result<()> {
-        self.sink.non_triangles(count)
-    }
 }
 
 /// Reads the mesh, with the coordinates of the file; returns also how many triangles were left out.
@@ -206,7 +202,7 @@ fn read(path: &Path, workspace: &Workspace) -> Result<(Intake, u64)> {
 /// Simplifies a mesh.
 ///
 /// # Errors
-/// [`Error::Input`] for a file that is no mesh of triangles in PLY; [`Error::Memory`], [`Error::Io`],
+/// [`Error::Input`] for a file that is no mesh; [`Error::Memory`], [`Error::Io`],
 /// [`Error::Disk`], [`Error::Corrupt`], [`Error::Cancelled`].
 pub fn simplify(path: &Path, options: &Options, workspace: &Workspace) -> Result<Simplified> {
     let (intake, degenerate) = read(path, workspace)?;

@@ -1,4 +1,4 @@
-//! Meshes in OBJ, STL and GLB. The first byte gives the ending of the name.
+//! Meshes in OBJ, STL, GLB and PLY. The first byte gives the ending of the name.
 
 use crate::{Bench, check_error};
 use outcrop::inspect::verify::{Options, verify_with};
@@ -8,7 +8,7 @@ use outcrop_disk::workspace::progress::{Cancel, Silent};
 use std::sync::Arc;
 
 /// The endings by the first byte.
-pub const ENDINGS: [&str; 3] = ["obj", "stl", "glb"];
+pub const ENDINGS: [&str; 4] = ["obj", "stl", "glb", "ply"];
 
 /// Verifies a mesh.
 pub fn read(bytes: &[u8]) {

@@ -327,6 +327,19 @@ fn foreign_meshes(seeds: &Seeds) -> Result {
     let facet = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 1 1e0 0\nendloop\nendfacet\n";
     let text = format!("\u{1}solid a\n{facet}{facet}endsolid a\n");
     seeds.put("foreign", "text.stl", text)?;
+    let header = "element vertex 4\nproperty uchar red\nproperty double z\nproperty float x\nproperty float y\n\
+                  property list uchar int more\nelement face 2\nproperty list uchar short vertex_index\n\
+                  property list uchar float texcoord\nelement edge 1\nproperty int vertex1\nend_header\n";
+    let vertices = "1 0 0 0 0\n2 0 1 0 1 7\n3 .5 1 1 0\n4 0 0 1 0\n";
+    let text =
+        format!("\u{3}ply\nformat ascii 1.0\n{header}{vertices}4 0 1 2 3 0\n2 1 2 1 .5\n9\n");
+    seeds.put("foreign", "quads.ply", text)?;
+    let triangle = header
+        .replace("vertex 4", "vertex 1")
+        .replace("face 2", "face 1");
+    let text = format!("\u{3}ply\nformat binary_big_endian 1.0\n{triangle}");
+    let body = [&[7][..], &[0; 17], &[4, 0, 0, 0, 0, 0, 0, 0, 0, 0], &[0; 4]].concat();
+    seeds.put("foreign", "quad.ply", [text.into_bytes(), body].concat())?;
     let folder = tempfile::tempdir()?;
     let cloud = folder.path().join("cloud.las");
     let las = Format::Las(LasOptions::default());

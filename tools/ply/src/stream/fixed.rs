@@ -1,7 +1,7 @@
 //! Meshes in binary files in which all entries have one size, read at any place.
 
 use super::binary::{PLAIN, plain};
-use super::{MeshStream, Role, index};
+use super::{MeshStream, Role, SLICE, index};
 use crate::error::FileError;
 use crate::header::bytes_of;
 use crate::numbers::{integer, real};
@@ -29,8 +29,12 @@ pub struct FixedMesh {
     /// Bytes before each coordinate in its entry, and its type.
     axes: [(usize, Scalar); 3],
     faces: Entries,
+    /// Number of faces.
+    count: u64,
     /// Bytes before the list of corners, types of its count and of its items.
     list: (usize, Scalar, Scalar),
+    /// True if the file ends where it does if all faces are triangles.
+    fits: bool,
 }
 
 impl MeshStream {
@@ -86,8 +90,22 @@ impl MeshStream {
             vertices,
             axes,
             faces,
+            count: self.faces(),
             list,
+            fits: at == self.source.bytes(),
         }))
+    }
+
+    /// True if the mesh can be read as it is, at any place: see [`MeshStream::fixed`]; its vertices come first, and
+    /// all its faces are triangles. Where the size of the file says so, the faces are not read for it.
+    ///
+    /// # Errors
+    /// [`FileError::Io`].
+    pub fn is_plain(&self) -> Result<bool, FileError> {
+        match self.fixed()? {
+            Some(fixed) if self.vertices_first() => Ok(fixed.fits || fixed.are_triangles()?),
+            _ => Ok(false),
+        }
     }
 }
 
@@ -148,6 +166,18 @@ impl FixedMesh {
             }
         }
         Ok(())
+    }
+
+    /// True if all faces are triangles.
+    fn are_triangles(&self) -> Result<bool, FileError> {
+        let (mut bytes, mut triangles) = (Vec::new(), Vec::new());
+        for first in (0..self.count).step_by(SLICE) {
+            let count = (self.count - first).min(SLICE as u64) as usize;
+            if !self.triangles((first, count), &mut bytes, &mut triangles)? {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 
     /// Replaces `triangles` by `count` faces of the mesh from `first` on, indices as in

@@ -11,6 +11,7 @@ mod values;
 use crate::error::{Error, FileError, Result};
 use crate::header::{Element, Field, Header};
 use crate::place::Place;
+use crate::system::System;
 use crate::types::{Encoding, Property, Scalar};
 use source::Source;
 use std::path::Path;
@@ -30,11 +31,12 @@ pub enum Part<'a> {
     Vertices(&'a [[f64; 3]]),
     /// The values of the columns that are wanted, of the vertices that came last, vertex by vertex.
     Values(&'a [f64]),
-    /// The corners of the next triangles, at most [`SLICE`]. Indices are as in the file, not checked against
-    /// the number of vertices; those below 0 or above [`NO_VERTEX`] are reported as [`NO_VERTEX`].
+    /// The corners of the next triangles, at most [`SLICE`]; a face with more corners is divided from its first
+    /// one. Indices are as in the file, not checked against the number of vertices; those below 0 or above
+    /// [`NO_VERTEX`] are reported as [`NO_VERTEX`].
     Triangles(&'a [[u32; 3]]),
-    /// A further face, without exactly three corners.
-    NonTriangle,
+    /// The number of corners of a face that is no triangle.
+    Polygon(u64),
 }
 
 /// A mesh with a checked header, to be read once, front to back, in a buffer of fixed size.
@@ -97,6 +99,12 @@ impl MeshStream {
         Ok(mesh)
     }
 
+    /// The name of the file in errors.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        self.source.path()
+    }
+
     /// Number of vertices; at most [`NO_VERTEX`], so that indices fit `u32`.
     #[must_use]
     pub fn vertices(&self) -> u64 {
@@ -107,6 +115,12 @@ impl MeshStream {
     #[must_use]
     pub fn faces(&self) -> u64 {
         self.count("face")
+    }
+
+    /// The reference system, as far as the header tells it.
+    #[must_use]
+    pub fn system(&self) -> &System {
+        &self.header.system
     }
 
     /// True if all vertices come before the first face.
@@ -291,18 +305,32 @@ fn faces<E: From<FileError>>(
             for (at, (name, property)) in element.properties.iter().enumerate() {
                 if at != list.0 {
                     source.skip_property(name, *property)?;
-                } else if let Some(corners) = source.corners(name, list)? {
-                    slice.push(corners);
-                } else {
-                    take(Part::NonTriangle)?;
+                    continue;
+                }
+                let corners = source.fan(name, list, |triangle| {
+                    slice.push(triangle);
+                    pass_on_full(&mut slice, take)
+                })?;
+                if corners != 3 {
+                    take(Part::Polygon(corners))?;
                 }
             }
             left -= 1;
         }
-        if slice.len() == SLICE {
-            take(Part::Triangles(&slice))?;
-            slice.clear();
-        }
+        pass_on_full(&mut slice, take)?;
     }
     take(Part::Triangles(&slice))
+}
+
+/// Passes on a slice of triangles if it is full.
+fn pass_on_full<E>(
+    slice: &mut Vec<[u32; 3]>,
+    take: &mut impl FnMut(Part<'_>) -> Result<(), E>,
+) -> Result<(), E> {
+    if slice.len() < SLICE {
+        return Ok(());
+    }
+    take(Part::Triangles(slice))?;
+    slice.clear();
+    Ok(())
 }

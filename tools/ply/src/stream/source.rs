@@ -48,6 +48,10 @@ impl Source {
         Self { path, ..self }
     }
 
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// Reads the header, at the begin of the file.
     pub(super) fn header(&mut self) -> Result<Header, FileError> {
         let header = Header::read(&mut self.peek(Header::LONGEST)?);

@@ -24,7 +24,7 @@ impl Read {
                 assert!(triangles.len() <= SLICE);
                 self.triangles.extend_from_slice(triangles);
             }
-            Part::NonTriangle => self.others += 1,
+            Part::Polygon(_) => self.others += 1,
         }
     }
 }
@@ -134,7 +134,8 @@ fn reads_every_variant() {
                     let got = read(&file(encoding, &header, &numbers)).unwrap();
                     assert_eq!(got.vertices, positions, "{header}");
                     assert_eq!(got.values, [200.0, -7.0].repeat(4), "{header}");
-                    assert_eq!(got.triangles, [[0, 1, 2], [3, 2, 1]], "{header}");
+                    let divided = [[0, 1, 2], [0, 1, 2], [0, 2, 3], [3, 2, 1]];
+                    assert_eq!(got.triangles, divided, "{header}");
                     assert_eq!(got.others, 2);
                 }
             }
@@ -197,9 +198,10 @@ fn many_slices_and_buffers() {
         assert_eq!(got.others, 200);
         let all = (0..vertices).map(f64::from).map(|v| [v, v + 0.5, -v]);
         assert!(got.vertices.iter().copied().eq(all));
-        let all = (0..faces)
-            .filter(|f| f % 1000 != 77)
-            .map(|f| [f, f + 1, f + 2]);
+        let all = (0..faces).flat_map(|f| {
+            let triangles = if f % 1000 == 77 { 3 } else { 1 };
+            (1..=triangles).map(move |c| [f, f + c, f + c + 1])
+        });
         assert!(got.triangles.iter().copied().eq(all));
     }
 }
@@ -234,7 +236,7 @@ fn every_truncation_is_refused() {
     let found = "the end of the file after 13 bytes";
     assert_eq!(
         text,
-        format!("byte {place}: found {found}, expected 16 bytes of a face")
+        format!("byte {place}: found {found}, expected a face of 4 corners")
     );
 }
 
@@ -350,4 +352,37 @@ fn elements_without_properties_cost_nothing() {
             Read::default()
         );
     }
+}
+
+#[test]
+fn plain_meshes_are_known_by_their_size_or_their_faces() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("mesh.ply");
+    let is_plain = |bytes: &[u8]| {
+        std::fs::write(&path, bytes).unwrap();
+        MeshStream::open(&path).unwrap().is_plain().unwrap()
+    };
+    let header = "element vertex 1\nproperty float x\nproperty float y\nproperty float z\n\
+                  element face 2\nproperty list uchar int vertex_indices\n";
+    let of = |encoding: &str, header: &str, corners: [usize; 2]| {
+        let mut numbers = vec![("float", 1.0); 3];
+        for count in corners {
+            numbers.push(("uchar", count as f64));
+            numbers.extend(vec![("int", 0.0); count]);
+        }
+        file(encoding, header, &numbers)
+    };
+    let little = "binary_little_endian";
+    let plain = of(little, header, [3, 3]);
+    assert!(is_plain(&plain));
+    assert!(is_plain(&of("binary_big_endian", header, [3, 3])));
+    assert!(is_plain(&[&plain[..], b"more"].concat()));
+    assert!(!is_plain(&of("ascii", header, [3, 3])));
+    assert!(!is_plain(&of(little, header, [3, 4])));
+    assert!(!is_plain(&of(little, header, [2, 3])));
+    let (vertices, faces) = header.split_at(header.find("element face").unwrap());
+    let turned = [faces, vertices].concat();
+    let numbers = [("uchar", 3.0), ("int", 0.0), ("int", 0.0), ("int", 0.0)].repeat(2);
+    let numbers = [&numbers[..], &[("float", 0.0); 3]].concat();
+    assert!(!is_plain(&file(little, &turned, &numbers)));
 }

@@ -87,28 +87,34 @@ impl Source {
         Ok(position)
     }
 
-    /// Reads the list of a face; none if it has not three corners.
-    pub(super) fn corners(
+    /// Reads the list of a face, and passes on the triangles that it is divided into from its first corner. Returns
+    /// the number of its corners.
+    pub(super) fn fan<E: From<FileError>>(
         &mut self,
         name: &str,
         (_, count, item): (usize, Scalar, Scalar),
-    ) -> Result<Option<[u32; 3]>, FileError> {
+        mut each: impl FnMut([u32; 3]) -> Result<(), E>,
+    ) -> Result<u64, E> {
         let length = self.length(name, count)?;
-        if length != 3 {
-            self.skip_numbers(length, item, name, "a face")?;
-            return Ok(None);
+        let big = self.big();
+        let least = length.saturating_mul(big.map_or(1, |_| item.bytes() as u64));
+        if least > self.left() {
+            let expected = format_args!("a face of {length} corners");
+            return Err(self.truncated(self.left(), expected).into());
         }
-        let mut corners = [0; 3];
-        if let Some(big) = self.big() {
-            let bytes = self.take(3 * item.bytes(), "a face")?;
-            for (corner, bytes) in corners.iter_mut().zip(bytes.chunks_exact(item.bytes())) {
-                *corner = index(integer(item, bytes, big));
+        let (mut first, mut last) = (0, 0);
+        for at in 0..length {
+            let corner = index(match big {
+                Some(big) => integer(item, self.take(item.bytes(), "a face")?, big),
+                None => self.parse(name, "an integer")?,
+            });
+            match at {
+                0 => first = corner,
+                1 => {}
+                _ => each([first, last, corner])?,
             }
-        } else {
-            for corner in &mut corners {
-                *corner = index(self.parse(name, "an integer")?);
-            }
+            last = corner;
         }
-        Ok(Some(corners))
+        Ok(length)
     }
 }

@@ -1,56 +1,43 @@
 //! The mesh to be closed, read at any place by all threads.
 
-use outcrop_codecs::ply_mesh::{AnyPlace, PlyMesh, Sink};
+use outcrop_codecs::ply_mesh::{AnyPlace, PlyMesh};
 use outcrop_disk::error::{Error, Result};
-use outcrop_disk::workspace::file::ScratchFile;
 use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_geom::vector::V3;
-use outcrop_ply::{Encoding, Layout, Scalar, put_triangle};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 /// Triangles that a unit reads.
-pub(super) const RANGE: u64 = 1 << 18;
+pub(crate) const RANGE: u64 = 1 << 18;
 
 /// Triangles that are read at a time.
 const SLICE: u64 = 1 << 15;
 
 /// Vertices of a page, which is read as a whole.
-pub(super) const PAGE: usize = 1 << 10;
+pub(crate) const PAGE: usize = 1 << 10;
 
 /// Pages that a reader of positions holds.
 const PAGES: usize = 256;
 
 /// Bytes of memory of a reader of triangles and positions.
-pub(super) const READER: u64 = ((PAGES + 1) * PAGE * 48 + (SLICE as usize) * 96) as u64;
+pub(crate) const READER: u64 = ((PAGES + 1) * PAGE * 48 + (SLICE as usize) * 96) as u64;
 
 /// A mesh.
-pub(super) struct Source {
+pub(crate) struct Source {
     path: PathBuf,
     mesh: PlyMesh,
     pub vertices: u64,
     pub triangles: u64,
-    /// The scratch file that it is copied to if entries have no fixed places.
-    _copy: Option<Arc<ScratchFile>>,
 }
 
 impl Source {
-    /// Opens a mesh; what has no fixed places in the file, such as text, is copied first.
+    /// Opens a mesh.
     pub fn open(path: &Path, workspace: &Workspace) -> Result<Self> {
         let mesh = PlyMesh::open_any(path, workspace)?;
-        let (mesh, copy) = match mesh.fixed()? {
-            Some(_) => (mesh, None),
-            None => {
-                let copy = copied(path, mesh, workspace)?;
-                (PlyMesh::open(&copy.0)?, Some(copy.1))
-            }
-        };
         Ok(Self {
             path: path.to_path_buf(),
             vertices: mesh.vertices(),
             triangles: mesh.faces(),
             mesh,
-            _copy: copy,
         })
     }
 
@@ -102,7 +89,7 @@ impl Source {
 }
 
 /// Positions of vertices, through pages that were read last.
-pub(super) struct Positions<'a> {
+pub(crate) struct Positions<'a> {
     fixed: &'a AnyPlace,
     source: &'a Source,
     pages: Vec<(u64, Vec<V3>)>,
@@ -149,76 +136,5 @@ impl<'a> Positions<'a> {
     /// The corners of a triangle.
     pub fn corners(&mut self, [a, b, c]: [u32; 3]) -> Result<[V3; 3]> {
         Ok([self.at(a)?, self.at(b)?, self.at(c)?])
-    }
-}
-
-/// A mesh as binary PLY in the scratch folder.
-fn copied(
-    path: &Path,
-    mesh: PlyMesh,
-    workspace: &Workspace,
-) -> Result<(PathBuf, Arc<ScratchFile>)> {
-    if !mesh.vertices_first() {
-        let expected = "the vertices before the faces";
-        return Err(Error::input(path, "mesh", "faces first", expected));
-    }
-    let layout = Layout {
-        encoding: Encoding::Little,
-        comments: &[],
-        vertices: mesh.vertices(),
-        coordinates: Scalar::F64,
-        columns: &[],
-        triangles: Some((mesh.faces(), Scalar::U32)),
-    };
-    let scratch = workspace.files.open("close.copy", false)?;
-    let mut copy = Copy {
-        path,
-        workspace,
-        scratch,
-        bytes: layout.header().into_bytes(),
-        place: PathBuf::new(),
-    };
-    let _held = workspace.reserve("close: copy", 4 << 20)?;
-    mesh.read(&mut copy)?;
-    copy.put()?;
-    Ok((copy.place, copy.scratch))
-}
-
-struct Copy<'a> {
-    path: &'a Path,
-    workspace: &'a Workspace,
-    scratch: Arc<ScratchFile>,
-    bytes: Vec<u8>,
-    place: PathBuf,
-}
-
-impl Copy<'_> {
-    fn put(&mut self) -> Result<()> {
-        let worker = self.workspace.files.worker();
-        let place = self.scratch.append(worker, &self.bytes, 0)?;
-        self.place = self.scratch.path(place.segment);
-        self.bytes.clear();
-        self.workspace.check_cancel()
-    }
-}
-
-impl Sink for Copy<'_> {
-    fn vertices(&mut self, positions: &[V3]) -> Result<()> {
-        let words = positions.as_flattened().iter();
-        self.bytes.extend(words.flat_map(|x| x.to_le_bytes()));
-        self.put()
-    }
-
-    fn triangles(&mut self, triangles: &[[u32; 3]]) -> Result<()> {
-        triangles
-            .iter()
-            .for_each(|t| put_triangle(*t, &mut self.bytes));
-        self.put()
-    }
-
-    fn non_triangles(&mut self, count: u64) -> Result<()> {
-        let found = format!("{count} that are not triangles");
-        let expected = "triangles; split them first";
-        Err(Error::input(self.path, "faces", found, expected))
     }
 }

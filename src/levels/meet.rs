@@ -1,12 +1,18 @@
 //! Lengths, and whether two triangles cross.
 
-use outcrop_geom::vector::{V3, cross, dot, sub};
+use outcrop_geom::vector::{Box3, V3, cross, dot, sub};
 
 /// Corners of a triangle.
-pub(super) type Corners = [V3; 3];
+pub(crate) type Corners = [V3; 3];
+
+/// Lowest and highest corner of the box around a triangle.
+pub(crate) fn bounds(t: &Corners) -> [V3; 2] {
+    let all = Box3::of(t);
+    [all.min, all.max]
+}
 
 /// The length of a vector.
-pub(super) fn norm(v: V3) -> f64 {
+pub(crate) fn norm(v: V3) -> f64 {
     dot(v, v).sqrt()
 }
 
@@ -36,7 +42,7 @@ fn pierces(p: V3, q: V3, [a, b, c]: Corners) -> bool {
 
 /// True if two triangles cross. Those that only touch do not, nor those in one plane; corners at one place are one
 /// vertex.
-pub(super) fn cross_each_other(s: &Corners, t: &Corners) -> bool {
+pub(crate) fn cross_each_other(s: &Corners, t: &Corners) -> bool {
     // From near by, so that far coordinates lose nothing.
     let origin = s[0];
     let [s, t] = [s, t].map(|t| t.map(|p| sub(p, origin)));
