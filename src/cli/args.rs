@@ -175,7 +175,7 @@ pub struct Info {
 /// `outcrop verify`
 #[derive(Debug, ClapArgs)]
 pub struct Verify {
-    /// The mesh (PLY)
+    /// The mesh (PLY, OBJ, STL or GLB)
     #[arg(value_name = "MESH")]
     pub mesh: PathBuf,
     /// Print JSON
@@ -194,7 +194,7 @@ pub struct Verify {
 /// `outcrop tiles`
 #[derive(Debug, ClapArgs)]
 pub struct Tiles {
-    /// The mesh (PLY, also as .zst)
+    /// The mesh (PLY, OBJ, STL or GLB, also as .zst)
     #[arg(value_name = "MESH")]
     pub mesh: PathBuf,
     /// The folder to write: tileset.json and tiles
@@ -224,7 +224,7 @@ pub struct Tiles {
 /// `outcrop simplify`
 #[derive(Debug, ClapArgs)]
 pub struct Simplify {
-    /// The mesh (PLY, also as .zst)
+    /// The mesh (PLY, OBJ, STL or GLB, also as .zst)
     #[arg(value_name = "MESH")]
     pub mesh: PathBuf,
     /// The mesh to write: .ply, .obj, .stl or .glb
@@ -238,7 +238,8 @@ pub struct Simplify {
     /// Close the boundary of what is left, as `outcrop close` does [without a value: auto]
     #[arg(long, value_name = "auto|lids|smooth|base[=Z]", num_args = 0..=1, default_missing_value = "auto")]
     pub close: Option<Closed>,
-    /// Samples of each mesh by which the distance between both is measured, e.g. 1e6; 0: it is not measured
+    /// Samples of each mesh by which the distance between both is measured, and most triangles by which
+    /// self-intersections are counted, e.g. 1e6; 0: neither is done
     #[arg(long, value_name = "N", default_value = "1000000", value_parser = samples)]
     pub samples: u64,
     /// Most triangles of a cell
@@ -256,7 +257,7 @@ pub struct Simplify {
 /// `outcrop close`
 #[derive(Debug, ClapArgs)]
 pub struct Close {
-    /// The mesh (PLY, also as .zst)
+    /// The mesh (PLY, OBJ, STL or GLB, also as .zst)
     #[arg(value_name = "MESH")]
     pub mesh: PathBuf,
     /// The mesh to write: .ply, .obj, .stl or .glb
@@ -293,7 +294,8 @@ pub struct SimplifyGoal {
 /// `outcrop compare`
 #[derive(Debug, ClapArgs)]
 pub struct Compare {
-    /// A mesh (PLY with faces) or a cloud (LAS, LAZ, EPT, E57, PLY, PCD, PTX, OFF, XYZ text, or a folder of them)
+    /// A mesh (PLY with faces, OBJ, STL or GLB) or a cloud (LAS, LAZ, EPT, E57, PLY, PCD, PTX, OFF, XYZ text, or a
+    /// folder of them)
     #[arg(value_name = "A")]
     pub a: PathBuf,
     /// The mesh or cloud to compare it with

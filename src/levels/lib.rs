@@ -4,13 +4,14 @@
 //! Every other tile is made from its children: they are joined, simplified (`simplify`) and measured against the
 //! joined surface (`distance`). A vertex that has triangles outside of the tile is not removed, so that tiles of
 //! any two levels meet without a crack. `docs/tiles.md` describes the files. `single` makes one mesh with fewer
-//! triangles instead, from the same cells, and `close` a mesh without a boundary. `cloud` thins points, to be shown
-//! beside a mesh.
+//! triangles instead, from the same cells, and `close` a mesh without a boundary; `crossed` counts self-intersections,
+//! `cloud` thins points, to be shown beside a mesh.
 
 mod cells;
 pub mod close;
 pub mod cloud;
 mod columns;
+pub mod crossed;
 mod distance;
 mod folder;
 mod geo;

@@ -7,19 +7,20 @@ use super::mesh_job::MeshJob;
 use super::resources::{Resources, resource_setters};
 use super::{Start, start::scratch_folder};
 use crate::params::Close;
-use crate::report::SimplifyReport;
+use crate::report::{Crossings, SimplifyReport};
 use crate::write::{Bounds, write};
 use outcrop_codecs::ply_mesh::PlyMesh;
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::progress::{Cancel, Observer};
 use outcrop_disk::workspace::{Storage, Workspace};
 use outcrop_inspect::compare;
+use outcrop_levels::crossed;
 use outcrop_levels::single::{self, Goal, Options, Simplified};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// The version of what a resumed run reads.
-const FORMAT: &str = "simplify 2";
+const FORMAT: &str = "simplify 3";
 
 /// The making of a mesh with fewer triangles.
 pub struct Simplification {
@@ -32,7 +33,7 @@ pub struct Simplification {
 }
 
 impl Simplification {
-    /// Makes `output`, a mesh in any format that is written, of `mesh`, a PLY file.
+    /// Makes `output`, a mesh in any format that is written, of `mesh`, in any that is read.
     pub fn new(mesh: impl Into<PathBuf>, output: impl Into<PathBuf>, goal: Goal) -> Self {
         Self {
             mesh: mesh.into(),
@@ -53,7 +54,8 @@ impl Simplification {
         self
     }
 
-    /// Sets the number of samples by which the distance between both meshes is measured; 0: it is not measured.
+    /// Sets the number of samples by which the distance between both meshes is measured, and the most triangles by which
+    /// crossings are counted; 0: neither is done.
     #[must_use]
     pub fn samples(mut self, samples: u64) -> Self {
         self.samples = samples;
@@ -76,7 +78,7 @@ impl Simplification {
     /// Makes the mesh.
     ///
     /// # Errors
-    /// [`Error::Input`] for a file that is no mesh of triangles in PLY; [`Error::Parameter`] for a goal or an output
+    /// [`Error::Input`] for a file that is no mesh; [`Error::Parameter`] for a goal or an output
     /// that makes no sense; [`Error::Memory`] if the budget is too small; [`Error::Io`], [`Error::Disk`],
     /// [`Error::Corrupt`], [`Error::Cancelled`]; those of an unfinished run, as of [`crate::Reconstruction::run`].
     pub fn run(&self) -> Result<SimplifyReport> {
@@ -137,20 +139,22 @@ impl Simplification {
             .close
             .map(|kind| closed(&open, &self.output, kind.into(), workspace));
         let closed = closed.transpose()?;
-        let measured = match self.samples {
-            0 => None,
-            samples
-                if open.extension().is_some_and(|e| {
-                    ["ply", "obj"]
-                        .iter()
-                        .any(|read| e.eq_ignore_ascii_case(read))
-                }) =>
-            {
-                let options = compare::Options { samples, seed: 0 };
-                Some(compare::compare(&self.mesh, &open, &options, workspace)?)
-            }
-            _ => None,
+        let is_measured = self.samples > 0 && tells_the_mesh(&open);
+        let measure = || {
+            let options = compare::Options {
+                samples: self.samples,
+                seed: 0,
+            };
+            compare::compare(&self.mesh, &open, &options, workspace)
         };
+        let cross = || {
+            let count = |mesh, name| crossed::count(mesh, name, self.samples, workspace);
+            let before = count(&self.mesh, "crossings before")?;
+            let after = count(&open, "crossings after")?;
+            Ok(Crossings { before, after })
+        };
+        let crossings = is_measured.then(cross).transpose()?;
+        let measured = is_measured.then(measure).transpose()?;
         Ok(SimplifyReport {
             vertices_before: made.before[0],
             triangles_before: made.before[1],
@@ -160,6 +164,7 @@ impl Simplification {
             goal: self.options.goal,
             error: made.error,
             passes: made.passes,
+            crossings,
             measured,
             closed,
         })
@@ -181,4 +186,13 @@ impl Simplification {
             made.read(writer, workspace)
         })
     }
+}
+
+/// True for a mesh in a format that has its vertices as they are.
+fn tells_the_mesh(path: &Path) -> bool {
+    path.extension().is_some_and(|name| {
+        ["ply", "obj"]
+            .iter()
+            .any(|known| name.eq_ignore_ascii_case(known))
+    })
 }
