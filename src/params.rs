@@ -65,6 +65,8 @@ pub struct Params {
     pub triangles: Option<u64>,
     /// Close the boundary of the mesh.
     pub close: Option<Close>,
+    /// Round positions and values in a tileset, as `outcrop tiles --lossy` does.
+    pub lossy: bool,
     /// Columns of the points that the mesh keeps, such as colours.
     pub attributes: Attributes,
     /// Colours with 16 bits instead of 8.
@@ -153,6 +155,7 @@ impl Default for Params {
             split: None,
             triangles: None,
             close: None,
+            lossy: false,
             attributes: Attributes::None,
             wide_colors: false,
             thin: None,

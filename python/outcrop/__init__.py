@@ -77,6 +77,7 @@ def reconstruct(
     split: Optional[float] = None,
     triangles: Optional[int] = None,
     close: Union[str, bool, None] = None,
+    lossy: bool = False,
     drop_classes: Optional[Classes] = None,
     keep_classes: Optional[Classes] = None,
     skip_lines: int = 0,

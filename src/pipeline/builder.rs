@@ -113,7 +113,7 @@ impl Builder {
         if self.output.as_os_str().is_empty() {
             return missing("output", "the path of the mesh");
         }
-        let tiles = levels::folder(&self.output, self.params.split.is_some())?;
+        let tiles = levels::folder(&self.output, &self.params)?;
         let made = made::output(&self.output, &self.params, tiles.is_some())?;
         let target = tiles.as_deref().unwrap_or(&self.output);
         let mesh = (tiles.is_some() || made.is_some()).then(|| mesh_of(target));

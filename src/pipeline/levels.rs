@@ -6,9 +6,10 @@ pub use absent::{check_folder, make, outlook, remove_unfinished};
 #[cfg(feature = "levels")]
 pub use made::make;
 #[cfg(feature = "levels")]
-pub use outcrop_levels::{check_folder, outlook::of_points as outlook, remove_unfinished};
+pub use outcrop_levels::{check_folder, outlook, remove_unfinished};
 
 use crate::features::LEVELS;
+use crate::params::Params;
 use outcrop_disk::error::{Error, Result};
 use std::path::{Path, PathBuf};
 
@@ -16,25 +17,34 @@ use std::path::{Path, PathBuf};
 const NAME: &str = "tileset.json";
 
 /// The folder of the tileset, if the output is one.
-pub fn folder(output: &Path, split: bool) -> Result<Option<PathBuf>> {
-    if output.file_name().is_none_or(|name| name != NAME) {
-        return Ok(None);
-    }
-    LEVELS.require()?;
-    let refuse = |found: String, expected: &str| {
+pub fn folder(output: &Path, params: &Params) -> Result<Option<PathBuf>> {
+    let refuse = |name, found: String, expected: &str| {
         Err(Error::Parameter {
-            name: "output",
+            name,
             found,
             expected: expected.into(),
         })
     };
+    match output.file_name().is_some_and(|name| name == NAME) {
+        true => LEVELS.require()?,
+        false if params.lossy => {
+            let expected = "DIR/tileset.json, for only tilesets are rounded";
+            return refuse("lossy", output.display().to_string(), expected);
+        }
+        false => return Ok(None),
+    }
     let folder = output
         .parent()
         .filter(|folder| folder.file_name().is_some());
     match folder {
-        _ if split => refuse("a tileset of a mesh in squares".into(), "one of both"),
+        _ if params.split.is_some() => refuse(
+            "output",
+            "a tileset of a mesh in squares".into(),
+            "one of both",
+        ),
         Some(folder) => Ok(Some(folder.to_path_buf())),
         None => refuse(
+            "output",
             output.display().to_string(),
             "DIR/tileset.json, with the name of a folder",
         ),
@@ -48,14 +58,19 @@ mod made {
     use outcrop_levels::{Options, TilesReport, tileset};
     use std::path::Path;
 
-    /// Makes the tileset `folder` of a mesh, which is called `source` in it.
+    /// Makes the tileset `folder` of a mesh, which is called `source` in it; rounded if it is `lossy`.
     pub fn make(
         mesh: &Path,
         source: &str,
         folder: &Path,
+        lossy: bool,
         workspace: &Workspace,
     ) -> Result<TilesReport> {
-        tileset(mesh, source, folder, &Options::default(), workspace)
+        let options = Options {
+            lossy,
+            ..Options::default()
+        };
+        tileset(mesh, source, folder, &options, workspace)
     }
 }
 
@@ -72,12 +87,24 @@ mod absent {
         Err(LEVELS.missing())
     }
 
-    pub fn make(_: &Path, _: &str, _: &Path, _: &Workspace) -> Result<TilesReport> {
+    pub fn make(_: &Path, _: &str, _: &Path, _: bool, _: &Workspace) -> Result<TilesReport> {
         Err(LEVELS.missing())
     }
 
-    pub fn outlook(_: u64, _: usize) -> Vec<Planned> {
-        Vec::new()
+    pub mod outlook {
+        use super::Planned;
+
+        pub fn of_points(_: u64, _: usize) -> Vec<Planned> {
+            Vec::new()
+        }
+
+        pub fn of_simplified(_: u64, _: usize) -> Vec<Planned> {
+            Vec::new()
+        }
+
+        pub fn of_closed(_: u64, _: usize) -> Vec<Planned> {
+            Vec::new()
+        }
     }
 
     pub fn remove_unfinished(_: &Path) {}

@@ -203,6 +203,7 @@ impl Manifest {
         if self.output != now.output {
             self.output = now.output.clone();
             self.params.compress_glb = now.params.compress_glb;
+            self.params.lossy = now.params.lossy;
         }
     }
 

@@ -15,6 +15,7 @@ const KEYS: &[&str] = &[
     "/parameters/crop_margin",
     "/parameters/split",
     "/parameters/close",
+    "/parameters/lossy",
     "/parameters/attributes",
     "/parameters/wide_colors",
     "/parameters/thin",

@@ -246,6 +246,9 @@ pub struct Job {
     /// lids, smooth, or base (walls from outer rims down to a floor) [without a value: auto]
     #[arg(long, value_name = "auto|lids|smooth|base[=Z]", num_args = 0..=1, default_missing_value = "auto")]
     pub close: Option<Closed>,
+    /// Round positions, normals, colours and other values of a tileset, as `outcrop tiles --lossy` does
+    #[arg(long)]
+    pub lossy: bool,
     #[command(flatten)]
     pub points: Points,
     #[command(flatten)]
@@ -292,6 +295,7 @@ impl Job {
             split: self.split,
             triangles: self.triangles,
             close: self.close,
+            lossy: self.lossy,
             attributes: self.columns.attributes.clone(),
             wide_colors: self.columns.wide_colors,
             thin: self.filters.thin,

@@ -154,7 +154,8 @@ impl Stages<'_> {
         workspace.trim();
         let source = job.inputs.first().and_then(|input| input.file_name());
         let source = source.unwrap_or_default().to_string_lossy();
-        let make = || levels::make(&job.mesh, &source, folder, workspace);
+        let lossy = job.params.lossy;
+        let make = || levels::make(&job.mesh, &source, folder, lossy, workspace);
         let triangles = self.report.mesh.triangles;
         self.report.tiles = Some(self.clock.stage("tiles", "triangles", triangles, make)?);
         Ok(())

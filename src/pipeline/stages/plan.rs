@@ -14,7 +14,13 @@ impl Stages<'_> {
         let compressed = job.params.compress_glb || is_compressed(&job.mesh);
         let mut stages = outlook::plan(&job.params, points, job.threads, valued, compressed);
         if job.tiles.is_some() {
-            stages.extend(levels::outlook(points, job.threads));
+            stages.extend(levels::outlook::of_points(points, job.threads));
+        }
+        if job.params.triangles.is_some() {
+            stages.extend(levels::outlook::of_simplified(points, job.threads));
+        }
+        if job.params.close.is_some() {
+            stages.extend(levels::outlook::of_closed(points, job.threads));
         }
         let first = stages.iter().rposition(|stage| Some(stage.name) == after);
         job.observer.plan(&stages[first.map_or(0, |at| at + 1)..]);
