@@ -6,7 +6,7 @@ mod headers;
 mod text;
 
 use crate::params::Params;
-use crate::pipeline::Known;
+use crate::pipeline::{Files, Known};
 #[cfg(feature = "pages")]
 pub use drawing::{Illustration, illustrated};
 pub use headers::{Headers, headers};
@@ -173,7 +173,7 @@ fn described(
         moved: None,
         text: None,
     };
-    let disk = known.estimate(&Params::default(), Path::new("mesh.ply"));
+    let disk = known.estimate(&Params::default(), Files::of(Path::new("mesh.ply")));
     Ok(Info {
         normals,
         duplicates,

@@ -6,8 +6,14 @@
 //! determine: where noise makes more triples it makes fewer triangles, so scratch and mesh together have the
 //! same size otherwise. Half a store is assumed, which is wrong by 4 bytes a point either way.
 //!
+//! What is made of the whole mesh comes after it (`after`): a smaller mesh takes several times its size.
+//!
 //! Unneeded files are not counted. They are deleted as soon as the deletion is synced
 //! (`workspace/keeper.rs`), within a moment.
+
+mod after;
+
+pub(crate) use after::Files;
 
 use super::Reconstruction;
 use crate::params::{Method, Params, Smooth};
@@ -204,8 +210,8 @@ impl Known {
         }
     }
 
-    /// The estimated space of a run with these parameters, whose mesh is `output`.
-    pub fn estimate(&self, params: &Params, output: &Path) -> DiskEstimate {
+    /// The estimated space of a run with these parameters.
+    pub fn estimate(&self, params: &Params, files: Files<'_>) -> DiskEstimate {
         let points = self.points as f64;
         let (moved, triples, _) = self.surface(params);
         let stores = STORED * (1.0 + moved);
@@ -241,9 +247,27 @@ impl Known {
         let late = (TRIPLE * triples).max(EXPORT + pieces);
         let late = (stores + kept + late) * points;
         let small = |bytes: f64| bytes + SMALL.0 * points + SMALL.1;
-        let mesh = |coordinates| {
-            let bytes = export::mesh_bytes(output, &self.mesh(params, coordinates));
-            let plain = bytes as f64 + values * points;
+        let whole = self.mesh_bytes(params, files.mesh, None);
+        let made = self.made(params, &files);
+        let after = small((stores + kept) * points) + self.factor(params, &files) * whole;
+        let scratch = small(early.max(late)).max(after);
+        let export = small((stores + values + EXPORT.max(pieces)) * points) + whole;
+        DiskEstimate {
+            scratch: scratch as u64,
+            output: (whole + made) as u64,
+            together: scratch.max(export).max(after + whole + made) as u64,
+        }
+    }
+
+    /// The size of a mesh of all points, or of one with this number of triangles.
+    fn mesh_bytes(&self, params: &Params, output: &Path, triangles: Option<u64>) -> f64 {
+        let of = |coordinates| {
+            let mut mesh = self.mesh(params, coordinates);
+            if let Some(triangles) = triangles.filter(|wanted| *wanted < mesh.triangles) {
+                (mesh.vertices, mesh.triangles) = (triangles / 2, triangles);
+            }
+            let bytes = export::mesh_bytes(output, &mesh);
+            let plain = (bytes + self.values * mesh.vertices) as f64;
             match export::is_compressed(output) {
                 true if !params.compress_glb => match coordinates {
                     CoordinateType::Float => COMPRESSED[0] * plain,
@@ -252,17 +276,10 @@ impl Known {
                 _ => plain,
             }
         };
-        let output = match self.double {
-            Some(false) => mesh(CoordinateType::Float),
-            Some(true) => mesh(CoordinateType::Double),
-            None => (mesh(CoordinateType::Float) + mesh(CoordinateType::Double)) / 2.0,
-        };
-        let scratch = small(early.max(late));
-        let export = small((stores + values + EXPORT.max(pieces)) * points) + output;
-        DiskEstimate {
-            scratch: scratch as u64,
-            output: output as u64,
-            together: scratch.max(export) as u64,
+        match self.double {
+            Some(false) => of(CoordinateType::Float),
+            Some(true) => of(CoordinateType::Double),
+            None => (of(CoordinateType::Float) + of(CoordinateType::Double)) / 2.0,
         }
     }
 

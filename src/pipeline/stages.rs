@@ -14,7 +14,7 @@ mod warnings;
 
 use super::checks::{all_are_kept, disk_radius, enough, room};
 use super::disk::{DISTINCT, NORMAL, SCANNER, SURE, Text, made};
-use super::{Clock, Known, Reconstruction};
+use super::{Clock, Files, Known, Reconstruction};
 use crate::params::Method;
 use crate::report::{LatticeReport, Report};
 use export::written;
@@ -87,7 +87,7 @@ impl<'a> Stages<'a> {
             true => None,
             false => Known::from_headers(&job.inputs, &job.params.selection()),
         };
-        let first = headers.map(|known| known.estimate(&job.params, &job.mesh));
+        let first = headers.map(|known| known.estimate(&job.params, Files::of_job(job)));
         let mut exceeded = None;
         if let Some(known) = headers.filter(|_| all_are_kept(&job.params)) {
             exceeded = known.fits(&job.params, &job.mesh, DISTINCT)?;
@@ -139,7 +139,7 @@ impl<'a> Stages<'a> {
         if whole && params.drop_outliers.is_none() {
             self.known.fits(params, output, SURE)?;
         }
-        let estimate = self.known.estimate(params, output);
+        let estimate = self.known.estimate(params, Files::of_job(self.job));
         self.report.estimated_scratch_bytes = estimate.scratch;
         self.report.estimated_output_bytes = estimate.output;
         room(&self.job.folder, &self.job.mesh, estimate, self.workspace)

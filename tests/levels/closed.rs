@@ -5,7 +5,6 @@ use super::single::{edges, read, shape};
 use outcrop::params::Close;
 use outcrop::{CloseReport, Closing, Error};
 use std::path::Path;
-use std::process::Command;
 
 struct Made {
     report: CloseReport,
@@ -431,55 +430,4 @@ fn long_loops_are_closed() {
         .sum();
     let floor = volume(&closed) / (area / 2.0);
     assert!((floor - 50.0).abs() < 0.1, "{floor}");
-}
-
-#[test]
-fn a_killed_run_goes_on_and_gives_the_same_bytes() {
-    let folder = tempfile::tempdir().unwrap();
-    let mesh = folder.path().join("mesh.ply");
-    hills(70, true).write(&mesh);
-    let program = |output: &Path, fault: &str| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_outcrop"));
-        command.arg("close").arg(&mesh).arg("-o").arg(output);
-        let words = [
-            "--kind=base",
-            "--quiet",
-            "--resume",
-            "--memory=192MiB",
-            "--threads=2",
-        ];
-        command.args(words);
-        if !fault.is_empty() {
-            command.env("OUTCROP_FAULT", fault);
-        }
-        command.output().unwrap()
-    };
-    let [first, events] = ["first.ply", "events"].map(|name| folder.path().join(name));
-    let counted = program(&first, &format!("count:{}", events.display()));
-    let words = String::from_utf8_lossy(&counted.stderr);
-    assert!(counted.status.success(), "{words}");
-    let want = std::fs::read(&first).unwrap();
-    let counts = std::fs::read_to_string(&events).unwrap();
-    let count = |event: &str| -> u64 {
-        let line = counts.lines().find(|line| line.starts_with(event));
-        line.and_then(|line| line.split_whitespace().last()?.parse().ok())
-            .unwrap_or(0)
-    };
-    let mut killed = 0;
-    for event in ["record", "torn", "recorded", "write", "synced", "delete"] {
-        let all = count(event).max(1);
-        for part in 0..4 {
-            let at = 1 + (all - 1) * part / 3;
-            let output = folder.path().join("again.ply");
-            let stopped = program(&output, &format!("{event}:{at}"));
-            killed += u32::from(!stopped.status.success());
-            let resumed = program(&output, "");
-            let words = String::from_utf8_lossy(&resumed.stderr);
-            assert!(resumed.status.success(), "{event} {at}: {words}");
-            assert!(std::fs::read(&output).unwrap() == want, "{event} {at}");
-            std::fs::remove_file(&output).unwrap();
-        }
-    }
-    assert!(killed > 12, "{killed}: {counts}");
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 3);
 }

@@ -4,6 +4,7 @@ mod checks;
 mod closed;
 mod cloud;
 mod globe;
+mod kills;
 mod lossy;
 mod meshes;
 mod resumed;

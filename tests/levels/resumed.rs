@@ -1,17 +1,16 @@
-//! The same bytes for any memory and threads, and after a run was stopped or killed.
+//! The same bytes for any memory and threads, and after a run was stopped.
 
 use super::meshes::hills;
 use outcrop::levels::{Options, TilesReport};
 use outcrop::{Cancel, Error, Observer, Start, Tiles};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 /// All files below a folder, with their content.
-fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+pub fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut all = BTreeMap::new();
     let mut left = vec![folder.to_path_buf()];
     while let Some(folder) = left.pop() {
@@ -151,63 +150,8 @@ fn a_stopped_run_goes_on() {
     equal(&output, &want, "resumed");
 }
 
-#[test]
-fn a_killed_run_goes_on() {
-    let folder = tempfile::tempdir().unwrap();
-    let mesh = folder.path().join("mesh.ply");
-    hills(70, true).write(&mesh);
-    let first = folder.path().join("first");
-    let program = |output: &Path, fault: &str| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_outcrop"));
-        command.arg("tiles").arg(&mesh).arg("-o").arg(output);
-        command.args([
-            "--quiet",
-            "--resume",
-            "--memory=192MiB",
-            "--threads=2",
-            "--most-triangles=300",
-        ]);
-        if !fault.is_empty() {
-            command.env("OUTCROP_FAULT", fault);
-        }
-        command.output().unwrap()
-    };
-    let events = folder.path().join("events");
-    let counted = program(&first, &format!("count:{}", events.display()));
-    assert!(
-        counted.status.success(),
-        "{}",
-        String::from_utf8_lossy(&counted.stderr)
-    );
-    let want = files(&first);
-    let counts = std::fs::read_to_string(&events).unwrap();
-    let count = |event: &str| -> u64 {
-        let line = counts.lines().find(|line| line.starts_with(event));
-        line.and_then(|line| line.split_whitespace().last()?.parse().ok())
-            .unwrap_or(0)
-    };
-    let mut killed = 0;
-    for event in ["record", "torn", "recorded", "write", "synced", "delete"] {
-        let all = count(event).max(1);
-        for part in 0..5 {
-            let at = 1 + (all - 1) * part / 4;
-            let output = folder.path().join(format!("{event} {at}"));
-            let stopped = program(&output, &format!("{event}:{at}"));
-            killed += u32::from(!stopped.status.success());
-            let resumed = program(&output, "");
-            let words = String::from_utf8_lossy(&resumed.stderr);
-            assert!(resumed.status.success(), "{event} {at}: {words}");
-            equal(&output, &want, &format!("{event} {at}"));
-            std::fs::remove_dir_all(&output).unwrap();
-        }
-    }
-    assert!(killed > 20, "{killed}: {counts}");
-    // Nothing is left beside.
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 3);
-}
-
 /// A cloud of a landscape, as text.
-fn cloud(path: &Path) {
+pub fn cloud(path: &Path) {
     let points = hills(60, false).vertices;
     let lines = points.iter().map(|[x, y, z]| format!("{x} {y} {z}\n"));
     std::fs::write(path, lines.collect::<String>()).unwrap();
@@ -325,6 +269,18 @@ fn a_cloud_becomes_the_tileset_of_its_mesh() {
     assert!(found == want);
     // Nothing else is left.
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 4);
+    let params = outcrop::Params {
+        lossy: true,
+        ..outcrop::Params::default()
+    };
+    let of = |output: &Path| run(output).params(params.clone()).build();
+    let lossy = of(&output).unwrap().run().unwrap().tiles.unwrap();
+    assert!(lossy.lossy.is_some() && lossy.bytes < tiles.bytes);
+    let refused = of(&at("small.ply"));
+    assert!(matches!(
+        refused,
+        Err(Error::Parameter { name: "lossy", .. })
+    ));
     for wrong in ["tileset.json", "/tileset.json"] {
         assert!(
             matches!(run(Path::new(wrong)).build(), Err(Error::Parameter { .. })),

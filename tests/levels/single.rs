@@ -5,7 +5,6 @@ use outcrop::levels::single::{Goal, Options};
 use outcrop::{Error, Simplification, SimplifyReport};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
-use std::process::Command;
 
 fn job(mesh: &Path, output: &Path, goal: Goal, most: u32) -> Simplification {
     let options = Options {
@@ -375,62 +374,4 @@ fn what_makes_no_sense_is_refused() {
         (was.vertices, was.triangles.len()),
         (is.vertices, is.triangles.len())
     );
-}
-
-#[test]
-fn a_killed_run_goes_on() {
-    let folder = tempfile::tempdir().unwrap();
-    let mesh = folder.path().join("mesh.ply");
-    hills(70, true).write(&mesh);
-    let program = |output: &Path, fault: &str| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_outcrop"));
-        command.arg("simplify").arg(&mesh).arg("-o").arg(output);
-        command.args([
-            "--ratio=0.1",
-            "--quiet",
-            "--resume",
-            "--memory=192MiB",
-            "--threads=2",
-            "--most-triangles=900",
-            "--samples=1000",
-        ]);
-        if !fault.is_empty() {
-            command.env("OUTCROP_FAULT", fault);
-        }
-        command.output().unwrap()
-    };
-    let (first, events) = (
-        folder.path().join("first.ply"),
-        folder.path().join("events"),
-    );
-    let counted = program(&first, &format!("count:{}", events.display()));
-    assert!(
-        counted.status.success(),
-        "{}",
-        String::from_utf8_lossy(&counted.stderr)
-    );
-    let want = std::fs::read(&first).unwrap();
-    let counts = std::fs::read_to_string(&events).unwrap();
-    let count = |event: &str| -> u64 {
-        let line = counts.lines().find(|line| line.starts_with(event));
-        line.and_then(|line| line.split_whitespace().last()?.parse().ok())
-            .unwrap_or(0)
-    };
-    let mut killed = 0;
-    for event in ["record", "torn", "recorded", "write", "synced", "delete"] {
-        let all = count(event).max(1);
-        for part in 0..4 {
-            let at = 1 + (all - 1) * part / 3;
-            let output = folder.path().join("again.ply");
-            let stopped = program(&output, &format!("{event}:{at}"));
-            killed += u32::from(!stopped.status.success());
-            let resumed = program(&output, "");
-            let words = String::from_utf8_lossy(&resumed.stderr);
-            assert!(resumed.status.success(), "{event} {at}: {words}");
-            assert!(std::fs::read(&output).unwrap() == want, "{event} {at}");
-            std::fs::remove_file(&output).unwrap();
-        }
-    }
-    assert!(killed > 15, "{killed}: {counts}");
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 3);
 }

@@ -16,7 +16,7 @@ const MILLION: Known = Known {
 #[test]
 fn more_is_known_later() {
     let params = Params::default();
-    let output = Path::new("mesh.ply");
+    let output = Files::of(Path::new("mesh.ply"));
     let first = MILLION.estimate(&params, output);
     let moved = |moved| {
         Known {
@@ -64,7 +64,7 @@ fn limits_of_formats_are_refused_if_certain_and_told_if_likely() {
 
 #[test]
 fn a_compressed_mesh_takes_less() {
-    let estimate = |name| MILLION.estimate(&Params::default(), Path::new(name));
+    let estimate = |name| MILLION.estimate(&Params::default(), Files::of(Path::new(name)));
     let (plain, compressed) = (estimate("mesh.ply"), estimate("mesh.ply.zst"));
     assert_eq!(plain.scratch, compressed.scratch);
     assert!(compressed.output * 2 > plain.output && compressed.output * 5 < plain.output * 3);
@@ -81,7 +81,7 @@ fn a_mesh_that_is_cut_takes_more() {
             smooth,
             ..Params::default()
         };
-        let estimate = MILLION.estimate(&params, Path::new("mesh.ply"));
+        let estimate = MILLION.estimate(&params, Files::of(Path::new("mesh.ply")));
         (estimate.scratch, estimate.together - estimate.output)
     };
     let (whole, writing) = scratch(None, false, Smooth::Rounds(0));
@@ -142,4 +142,35 @@ fn headers_tell_the_precision_of_the_mesh() {
     assert_eq!(double(&[&near, &far]), Some(true));
     assert_eq!(double(&[&broken]), None);
     assert_eq!(double(&[&text]), None);
+}
+
+#[test]
+fn what_is_made_of_the_whole_mesh_takes_room_beside_it() {
+    let whole = Files::of(Path::new(".whole.ply"));
+    let made = Files {
+        made: Some(Path::new("small.ply")),
+        ..whole
+    };
+    let params = |triangles| Params {
+        triangles,
+        ..Params::default()
+    };
+    let of = |triangles, files| MILLION.estimate(&params(triangles), files);
+    let plain = of(None, whole);
+    let closed = of(None, made);
+    assert_eq!(closed.scratch, plain.scratch);
+    assert_eq!(closed.output, 2 * plain.output);
+    let small = of(Some(100_000), made);
+    // 50 000 vertices and 100 000 triangles, and a header.
+    assert!((1_900_000..1_901_000).contains(&(small.output - plain.output)));
+    assert!(small.scratch > 5 * plain.output && small.scratch < 6 * plain.output);
+    assert_eq!(small.together, small.scratch + small.output);
+    let memory = 90 << 20;
+    let tight = of(Some(100_000), Files { memory, ..made });
+    assert!(tight.scratch > 9 * plain.output);
+    let tiles = Files {
+        tiles: true,
+        ..whole
+    };
+    assert!(of(None, tiles).scratch > 2 * plain.output);
 }
