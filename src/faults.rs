@@ -2,8 +2,7 @@
 
 use outcrop_disk::workspace::fault::{self, Event, Faults};
 use outcrop_disk::workspace::limits;
-use rustix::io::Errno;
-use rustix::process::{Signal, getpid, kill_process};
+use outcrop_platform::process::{DISK_FAILS, DISK_FULL, freeze, kill};
 use std::io;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -36,8 +35,8 @@ enum Plan {
     Freeze,
     /// Have this number of MiB resident for some seconds before a finished journal is published.
     Hold(u64),
-    /// From this event on, all of its kind fail, as on a disk that is full or removed.
-    Fail(Event, Errno, u64),
+    /// From this event on, all of its kind fail with this number of an error, as on a disk that is full or removed.
+    Fail(Event, i32, u64),
     /// A format of meshes with a limit holds this number of bytes.
     Most(u64),
     /// Write the number of events of each kind to this file.
@@ -54,9 +53,9 @@ impl Plan {
         }
         let number = rest.parse().ok()?;
         Some(match kind {
-            "full" => Self::Fail(Event::Write, Errno::NOSPC, number),
-            "eio" => Self::Fail(Event::Write, Errno::IO, number),
-            "sync" => Self::Fail(Event::Sync, Errno::IO, number),
+            "full" => Self::Fail(Event::Write, DISK_FULL, number),
+            "eio" => Self::Fail(Event::Write, DISK_FAILS, number),
+            "sync" => Self::Fail(Event::Sync, DISK_FAILS, number),
             "hold" => Self::Hold(number),
             "most" => Self::Most(number),
             _ => {
@@ -87,13 +86,11 @@ impl Faults for Planned {
     fn at(&self, event: Event) -> io::Result<()> {
         let number = self.count(event);
         match self.plan {
-            Plan::Kill(kind, at) if kind == event && at == number => die(),
+            Plan::Kill(kind, at) if kind == event && at == number => kill(),
             Plan::Fail(kind, error, at) if kind == event && at <= number => {
-                return Err(error.into());
+                return Err(io::Error::from_raw_os_error(error));
             }
-            Plan::Freeze if event == Event::Publish => {
-                let _ = kill_process(getpid(), Signal::STOP);
-            }
+            Plan::Freeze if event == Event::Publish => freeze(),
             Plan::Hold(mebibytes) if event == Event::Publish => hold(mebibytes << 20),
             _ => {}
         }
@@ -104,7 +101,7 @@ impl Faults for Planned {
         let number = self.count(Event::Torn);
         if self.plan == Plan::Kill(Event::Torn, number) {
             part();
-            die();
+            kill();
         }
     }
 
@@ -124,12 +121,6 @@ impl Faults for Planned {
             let _ = std::fs::write(path, lines.concat());
         }
     }
-}
-
-/// Ends the program like `kill -9`.
-fn die() -> ! {
-    let _ = kill_process(getpid(), Signal::KILL);
-    std::process::abort()
 }
 
 /// Has this number of bytes resident in all.
@@ -171,7 +162,11 @@ mod tests {
     fn from_an_event_on_all_of_its_kind_fail() {
         for (text, event, kind) in [
             ("full:2", Event::Write, io::ErrorKind::StorageFull),
-            ("sync:2", Event::Sync, io::Error::from(Errno::IO).kind()),
+            (
+                "sync:2",
+                Event::Sync,
+                io::Error::from_raw_os_error(DISK_FAILS).kind(),
+            ),
         ] {
             let faults = planned(text);
             let others = EVENTS.iter().filter(|(other, _)| *other != event);

@@ -3,7 +3,7 @@
 
 mod source;
 
-use source::modules;
+use source::{modules, modules_of};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -316,6 +316,54 @@ fn only_kernels_are_tied_to_a_processor() {
         assert_eq!(others, 0, "{module}");
     }
     assert!(uses > 5, "{uses}");
+}
+
+#[test]
+fn only_the_platform_knows_the_system() {
+    let tied = [
+        "cfg(unix",
+        "cfg(windows",
+        "cfg!(unix",
+        "cfg!(windows",
+        "target_os",
+        "target_env",
+        "target_family",
+        "std::os::",
+        "rustix::",
+        "libc::",
+        "signal_hook",
+        "windows_sys",
+        "/proc/",
+        "/sys/",
+    ];
+    let found = modules().into_iter().chain(modules_of("tools/ply/src"));
+    let found = found.filter(|(module, text)| {
+        !module.starts_with("platform") && tied.iter().any(|word| text.contains(word))
+    });
+    assert_eq!(found.map(|(module, _)| module).collect::<Vec<_>>(), [""; 0]);
+}
+
+/// The compiler sees the files of one system only.
+#[test]
+fn every_system_has_every_item_of_the_platform() {
+    let word = |c: char| c.is_alphanumeric() || c == '_';
+    let all = modules_of("src/platform");
+    let faces = ["files", "names", "process"].map(|face| &all[face]);
+    let items = faces.into_iter().flat_map(|text| {
+        let after = text
+            .match_indices("system::")
+            .map(|(at, _)| &text[at + 8..]);
+        after.map(|rest| &rest[..rest.find(|c| !word(c)).unwrap_or(rest.len())])
+    });
+    let items: BTreeSet<&str> = items.collect();
+    assert!(items.len() > 30, "{items:?}");
+    for system in ["linux", "macos", "windows"] {
+        let here = all.iter().filter(|(name, _)| name.starts_with(system));
+        let words = here.flat_map(|(_, text)| text.split(|c| !word(c)));
+        let words: BTreeSet<&str> = words.collect();
+        let missing: Vec<_> = items.difference(&words).collect();
+        assert!(missing.is_empty(), "{system} lacks {missing:?}");
+    }
 }
 
 #[test]

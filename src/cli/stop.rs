@@ -7,8 +7,8 @@ use crate::pipeline::Reconstruction;
 use crossbeam_channel::{Receiver, after, never, select, tick, unbounded};
 use outcrop_disk::workspace::progress::{Cancel, Observer};
 use outcrop_disk::workspace::{Folder, fault, lock};
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-use signal_hook::iterator::Signals;
+use outcrop_platform::process::on_stop;
+pub use outcrop_platform::quoted;
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicI32, Ordering};
 use std::sync::{Arc, Mutex};
@@ -81,12 +81,11 @@ pub fn watch(bars: Option<Arc<Bars>>) -> Cancel {
 /// Receives the signals that stop a run.
 fn signals() -> Receiver<i32> {
     // Without a handler a signal ends the program; the run can be resumed in this case too.
-    let Ok(mut signals) = Signals::new([SIGINT, SIGTERM, SIGHUP]) else {
-        return never();
-    };
     let (sender, receiver) = unbounded();
-    std::thread::spawn(move || signals.forever().try_for_each(|s| sender.send(s)));
-    receiver
+    match on_stop(move |signal| sender.send(signal).is_ok()) {
+        true => receiver,
+        false => never(),
+    }
 }
 
 /// Notes that a run begins which the program may end at any time.
@@ -114,15 +113,4 @@ pub fn hint() -> String {
     folder.map_or(String::new(), |folder| {
         format!("; go on with: outcrop resume {}", quoted(&folder))
     })
-}
-
-/// A path quoted for a shell.
-pub fn quoted(path: &std::path::Path) -> String {
-    let text = path.display().to_string();
-    let plain = |c: char| c.is_alphanumeric() || "/._-+,@%".contains(c);
-    if text.chars().all(plain) {
-        text
-    } else {
-        format!("'{}'", text.replace('\'', "'\\''"))
-    }
 }

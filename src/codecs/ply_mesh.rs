@@ -4,10 +4,10 @@ use crate::foreign::{as_plain_ply, as_ply, is_foreign};
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::compressed::{Beginning, Content};
+use outcrop_platform::FileAt;
 use outcrop_ply::{FileError, FixedMesh, Header, MeshStream, Part, Scalar, System};
 use std::fs::File;
 use std::io::BufReader;
-use std::os::unix::fs::FileExt;
 use std::path::Path;
 
 pub use outcrop_ply::{NO_VERTEX, SLICE};

@@ -150,8 +150,7 @@ impl Maker<'_> {
         let json = self.json(about).to_string();
         put(&unfinished.join(NAME), json.as_bytes())?;
         // All files at once: one by one would take long.
-        let synced = File::open(&unfinished)
-            .and_then(|folder| rustix::fs::syncfs(&folder).map_err(Into::into));
+        let synced = outcrop_platform::sync_below(&unfinished);
         synced.map_err(failed(&unfinished, "sync"))?;
         let old = beside(folder, "old");
         remove(&old)?;

@@ -6,10 +6,10 @@ use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::{Workspace, limits};
 use outcrop_geom::lattice::Lattice;
 use outcrop_mesh_files::export::{folder_of, is_square_of};
+use outcrop_platform::device;
 use outcrop_points::Classes;
 use outcrop_stages::cells::{CellStats, DiskRadius};
 use outcrop_stages::order::StoredPoints;
-use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 /// Larger disks, in steps, contain any cloud.
@@ -54,7 +54,6 @@ pub(super) fn room(
     estimate: DiskEstimate,
     workspace: &Workspace,
 ) -> Result<()> {
-    let device = |path: &Path| Some(path.metadata().ok()?.dev());
     let shared = device(scratch) == device(folder_of(output));
     let needed = match shared {
         true => estimate.together,

@@ -5,11 +5,9 @@ use super::{Builder, Reconstruction};
 use crate::params::Params;
 use outcrop_disk::error::{Error, Result};
 use outcrop_mesh::surface::evidence::Division;
+use outcrop_platform::{FileAt, modified, path_bytes, path_of_bytes};
 use serde::{Deserialize, Serialize};
-use std::ffi::OsString;
 use std::fs::File;
-use std::os::unix::ffi::{OsStrExt, OsStringExt};
-use std::os::unix::fs::{FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
 /// The format of scratch folders that this program writes and reads.
@@ -35,14 +33,14 @@ impl Name {
         };
         Ok(match path.as_os_str().to_str() {
             Some(text) => Self::Text(text.to_owned()),
-            None => Self::Bytes(path.as_os_str().as_bytes().to_vec()),
+            None => Self::Bytes(path_bytes(&path)),
         })
     }
 
     fn path(&self) -> PathBuf {
         match self {
             Self::Text(text) => text.into(),
-            Self::Bytes(bytes) => OsString::from_vec(bytes.clone()).into(),
+            Self::Bytes(bytes) => path_of_bytes(bytes.clone()),
         }
     }
 }
@@ -89,7 +87,7 @@ impl Identity {
         Ok(Self {
             path: Name::of(path)?,
             bytes: meta.len(),
-            modified: (meta.mtime(), meta.mtime_nsec()),
+            modified: modified(&meta),
             sample: crc.finalize(),
             tag: None,
         })

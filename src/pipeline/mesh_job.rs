@@ -5,9 +5,9 @@ use super::{Start, start::scratch_folder};
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::memory::MemoryPool;
 use outcrop_disk::workspace::{Folder, Found, Workspace, fault};
+use outcrop_platform::{FileAt, modified};
 use serde::{Deserialize, Serialize};
 use std::fs::File;
-use std::os::unix::fs::{FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
 /// A run that makes something of a mesh.
@@ -60,7 +60,7 @@ impl<O: Clone + Serialize> Manifest<O> {
             output: whole(job.output),
             options: job.options.clone(),
             bytes: about.len(),
-            modified: (about.mtime(), about.mtime_nsec()),
+            modified: modified(&about),
             sample,
         })
     }

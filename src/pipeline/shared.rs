@@ -54,9 +54,9 @@ pub enum Advanced {
 
 /// Checksum of this program, with its version.
 fn program() -> Result<u32> {
-    let path = Path::new("/proc/self/exe");
-    let io = |e| Error::io(path, "read", e);
-    let mut file = std::fs::File::open(path).map_err(io)?;
+    let path = outcrop_platform::program().map_err(|e| Error::io("outcrop", "find", e))?;
+    let io = |e| Error::io(&path, "read", e);
+    let mut file = std::fs::File::open(&path).map_err(io)?;
     let mut crc = crc32fast::Hasher::new();
     let mut buffer = vec![0; 1 << 20];
     loop {

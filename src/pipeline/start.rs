@@ -25,7 +25,7 @@ pub(super) fn scratch_folder(output: &Path, parent: Option<&Path>) -> PathBuf {
     };
     // Outputs of the same name in several folders may share one folder for scratch.
     let whole = std::path::absolute(output).unwrap_or_else(|_| output.to_path_buf());
-    let bytes = std::os::unix::ffi::OsStrExt::as_bytes(whole.as_os_str());
-    name.push(format!("-{:08x}.outcrop-scratch", crc32fast::hash(bytes)));
+    let bytes = outcrop_platform::path_bytes(&whole);
+    name.push(format!("-{:08x}.outcrop-scratch", crc32fast::hash(&bytes)));
     parent.join(name)
 }

@@ -10,9 +10,9 @@ use outcrop_disk::workspace::compressed::{Beginning, Content};
 use outcrop_disk::workspace::mapped::Window;
 use outcrop_disk::workspace::zip::Wanted;
 use outcrop_disk::workspace::{IoCounters, Workspace};
+use outcrop_platform::FileAt;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
-use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

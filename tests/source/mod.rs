@@ -1,27 +1,28 @@
 //! The source text of the library, for tests of the code itself.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-fn source() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
+/// Every module of the library that is not a test; its text without comments and tests.
+pub fn modules() -> BTreeMap<String, String> {
+    let mut all = modules_of("src");
+    all.retain(|module, _| !["main", "lib"].contains(&module.as_str()));
+    assert!(all.len() > 100, "only {} modules found", all.len());
+    all
 }
 
-/// Every module that is not a test; its text without comments and tests.
-pub fn modules() -> BTreeMap<String, String> {
-    fn walk(folder: &Path, all: &mut BTreeMap<String, String>) {
+/// Every module of a folder that is not a test; its text without comments and tests.
+pub fn modules_of(source: &str) -> BTreeMap<String, String> {
+    fn walk(source: &Path, folder: &Path, all: &mut BTreeMap<String, String>) {
         for entry in std::fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
             let name = path.file_stem().unwrap().to_str().unwrap();
             if path.is_dir() {
-                walk(&path, all);
+                walk(source, &path, all);
             } else if path.extension().is_some_and(|e| e == "rs") && !name.contains("tests") {
-                let relative = path.strip_prefix(source()).unwrap().with_extension("");
-                let relative = relative.to_str().unwrap();
-                if ["main", "lib"].contains(&relative) {
-                    continue;
-                }
-                let module = relative.strip_suffix("/mod").unwrap_or(relative);
+                let relative = path.strip_prefix(source).unwrap().with_extension("");
+                let relative = relative.to_str().unwrap().replace('\\', "/");
+                let module = relative.strip_suffix("/mod").unwrap_or(&relative);
                 let module = module.strip_suffix("/lib").unwrap_or(module);
                 let text = std::fs::read_to_string(&path).unwrap();
                 let text = text.split("#[cfg(test)]\nmod tests {").next().unwrap();
@@ -31,7 +32,7 @@ pub fn modules() -> BTreeMap<String, String> {
         }
     }
     let mut all = BTreeMap::new();
-    walk(&source(), &mut all);
-    assert!(all.len() > 100, "only {} modules found", all.len());
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join(source);
+    walk(&source, &source, &mut all);
     all
 }

@@ -34,7 +34,7 @@ pub fn submit(args: &Submit) -> Result<bool> {
 
 /// This program.
 fn program() -> Result<PathBuf> {
-    std::env::current_exe().map_err(|e| Error::io("/proc/self/exe", "find", e))
+    std::env::current_exe().map_err(|e| Error::io("outcrop", "find", e))
 }
 
 /// The state of the run; an error if a shard failed too often.

@@ -14,10 +14,10 @@ mod weld;
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::compressed::plain_name;
+use outcrop_platform::FileAt;
 use spool::Spool;
 use std::fs::File;
 use std::hash::{DefaultHasher, Hash, Hasher};
-use std::os::unix::fs::{FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
 /// A format.

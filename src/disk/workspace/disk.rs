@@ -1,6 +1,6 @@
 //! A short measurement of the scratch disk.
 
-use super::mapped::is_local;
+use outcrop_platform::is_local;
 use std::io::Write;
 use std::path::Path;
 use std::time::Instant;

@@ -15,9 +15,9 @@ use super::recover::{Whereabouts, recover};
 use super::run::{ResumableRun, Role};
 use crate::error::{Error, Remedy, Result};
 use journals::{Ends, read_history, workers};
+use outcrop_platform::{FileAt, make_private_folder};
 use std::collections::HashSet;
 use std::fs::File;
-use std::os::unix::fs::{DirBuilderExt, FileExt, MetadataExt};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -161,7 +161,7 @@ impl Folder {
             std::fs::create_dir_all(parent)
                 .map_err(|e| Error::io(parent, "make the scratch folder", e))?;
         }
-        match std::fs::DirBuilder::new().mode(0o700).create(path) {
+        match make_private_folder(path) {
             Err(e) if e.kind() != std::io::ErrorKind::AlreadyExists => {
                 return Err(Error::io(path, "make the scratch folder", e));
             }
@@ -338,8 +338,8 @@ pub(super) fn is_private(path: &Path) -> Result<bool> {
     if !meta.is_dir() {
         return Err(Error::not_resumable(path, "it is not a folder"));
     }
-    let own = rustix::process::geteuid().as_raw();
-    if meta.uid() != own || meta.mode() & 0o077 != 0 {
+    let private = outcrop_platform::is_private(path, &meta);
+    if !private.map_err(|e| Error::io(path, "look at", e))? {
         let why = "it is open to other users, so what is in it cannot be trusted";
         return Err(Error::not_resumable(path, why));
     }

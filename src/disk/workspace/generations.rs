@@ -18,10 +18,10 @@ use super::memory::MemoryPool;
 use super::open::{failed_write, open_existing, options};
 use super::run::ResumableRun;
 use crate::error::{Error, Remedy, Result};
+use outcrop_platform::{FileAt, make_private_folder};
 use publish::{link, sync};
 use std::io::ErrorKind;
 use std::ops::Range;
-use std::os::unix::fs::{DirBuilderExt, FileExt};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -150,8 +150,7 @@ impl SharedFolder {
         if let Some(parent) = path.parent().filter(|p| !p.as_os_str().is_empty()) {
             std::fs::create_dir_all(parent).map_err(io("make the folder"))?;
         }
-        let folder = std::fs::DirBuilder::new().mode(0o700).create(path);
-        folder.map_err(|e| match e.kind() {
+        make_private_folder(path).map_err(|e| match e.kind() {
             ErrorKind::AlreadyExists => Error::not_resumable(path, "it exists already")
                 .with(Remedy::Remove)
                 .with(Remedy::Another("scratch")),

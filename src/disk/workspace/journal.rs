@@ -12,9 +12,9 @@ use super::lock;
 use super::open::{failed_write, open_existing, options};
 use super::place::Put;
 use crate::error::{Error, Result};
+use outcrop_platform::FileAt;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
-use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 

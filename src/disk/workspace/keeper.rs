@@ -218,7 +218,7 @@ impl Keeper {
         let failed: Arc<Failed> = Arc::default();
         let rounds = Rounds {
             messages,
-            folder: File::open(folder)?,
+            folder: outcrop_platform::open_folder(folder)?,
             path: folder.to_path_buf(),
             io: io.clone(),
             failed: failed.clone(),

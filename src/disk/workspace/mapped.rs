@@ -1,6 +1,7 @@
 //! Files mapped into memory.
 
-use memmap2::{Advice, Mmap, MmapOptions};
+use memmap2::{Mmap, MmapOptions};
+use outcrop_platform::{is_local, populate};
 use std::fs::File;
 use std::ops::Deref;
 use std::path::Path;
@@ -32,26 +33,8 @@ impl FromStr for Io {
     }
 }
 
-/// Types of local file systems, on which a page of a mapped file cannot be lost with a connection or with
-/// another process: ext2 to ext4, XFS, Btrfs, F2FS, ZFS, bcachefs, tmpfs and overlays (`f_type` of statfs).
-const LOCAL: [u32; 8] = [
-    0xef53,
-    0x5846_5342,
-    0x9123_683e,
-    0xf2f5_2010,
-    0x2fc1_2fc1,
-    0xca45_1a4e,
-    0x0102_1994,
-    0x794c_7630,
-];
-
 /// With [`Io::Auto`], the part of the free budget that one file may take: a quarter.
 const SHARE: u64 = 4;
-
-/// True if `path` is on a file system that is known to be local.
-pub(super) fn is_local(path: &Path) -> bool {
-    rustix::fs::statfs(path).is_ok_and(|found| LOCAL.contains(&(found.f_type as u32)))
-}
 
 impl Io {
     /// True if the file at `path`, of this size, is to be mapped when this much of the budget is free.
@@ -82,7 +65,7 @@ impl Mapping {
         // SIGBUS.
         let map = unsafe { Mmap::map(file) }.ok()?;
         // Fails where a later access would raise SIGBUS. Older systems read at the first access.
-        match map.advise(Advice::PopulateRead) {
+        match populate(&map) {
             Err(e) if e.kind() != std::io::ErrorKind::InvalidInput => None,
             _ => Some(Self(map)),
         }
@@ -122,7 +105,7 @@ impl Window {
         // same time changes what is read, as it does without a mapping. Whoever cuts it between the next line
         // and the end of its use ends the run by SIGBUS.
         let map = unsafe { MmapOptions::new().offset(offset).len(bytes).map(file) }.ok()?;
-        map.advise(Advice::PopulateRead).ok()?;
+        populate(&map).ok()?;
         Some(Self::Mapped(map))
     }
 }
@@ -178,7 +161,6 @@ mod tests {
         assert!(Io::Map.maps(&here, 10, 10) && !Io::Map.maps(&here, 11, 10));
         assert!(!Io::Read.maps(&here, 1, 1 << 30));
         assert!(!Io::Auto.maps(&here, 3, 8));
-        assert!(!Io::Auto.maps(Path::new("/proc"), 1, 8));
         assert_eq!(Io::Auto.maps(&here, 2, 8), is_local(&here));
     }
 }

@@ -6,7 +6,6 @@
 //! reservations count as held in full. The largest usage of a unit counts for its thread until the loop over the units ends, since the
 //! allocator keeps that memory for the next unit.
 
-mod trim;
 mod usage;
 
 pub use usage::{Holding, bytes_of, table_bytes};
@@ -14,6 +13,7 @@ pub(super) use usage::{Slot, Usage};
 
 use super::lock;
 use crate::error::{Error, Result};
+use outcrop_platform::process::{CAN_TRIM, trim};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Condvar, Mutex};
 
@@ -187,14 +187,14 @@ impl MemoryPool {
     /// For the time between stages, when none of the threads is at work.
     pub fn trim(&self, threads: &rayon::ThreadPool) {
         if self.is_tight() {
-            trim::trim(threads);
+            trim(|work| drop(threads.broadcast(|_| work())));
         }
     }
 
     /// True if the budget is so small that freed memory is returned to the system. Then the present usage
     /// counts; otherwise a thread keeps the largest usage of its units.
     fn is_tight(&self) -> bool {
-        trim::CAN && self.0.budget < TIGHT
+        CAN_TRIM && self.0.budget < TIGHT
     }
 
     fn thread(&self) -> u64 {

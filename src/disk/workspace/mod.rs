@@ -136,7 +136,7 @@ impl Workspace {
         observer: Arc<dyn Observer>,
         cancel: Cancel,
     ) -> Self {
-        limits::open_many_files();
+        outcrop_platform::process::open_many_files();
         let shared = Arc::new(Shared {
             folder: folder.clone(),
             io: io.clone(),

@@ -6,10 +6,10 @@ use super::names::{OUTPUT, square_path, temporary};
 use super::open::open_existing;
 use super::progress::{Cancel, Observer};
 use crate::error::Result;
+use outcrop_platform::FileAt;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
-use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
 /// Bytes checked at a time.

@@ -4,14 +4,14 @@ use super::batch::Batch;
 use super::format::{Layout, Mesh, MeshFormat, Positions};
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::fault::{self, Event};
-use outcrop_disk::workspace::open::{failed_write, open_existing, options};
+use outcrop_disk::workspace::open::{failed_write, open_existing};
 use outcrop_disk::workspace::place::{Place, Put};
 pub use outcrop_disk::workspace::temporary;
 use outcrop_disk::workspace::{OUTPUT, RENAMED, Unit, Workspace, limits};
+use outcrop_platform::{FileAt, public_options, sync_folder};
 use std::fs::File;
 use std::io::ErrorKind::NotFound;
 use std::ops::Range;
-use std::os::unix::fs::{FileExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
 /// A triangle with the positions of its corners.
@@ -136,7 +136,7 @@ impl<'a> MeshFile<'a> {
         workspace: &'a Workspace,
     ) -> Result<Self> {
         // Several threads may do this at the same time.
-        let file = options().mode(0o666).create(true).open(&temporary);
+        let file = public_options().create(true).open(&temporary);
         let file = file.map_err(|e| Error::io(output, "create a file beside it", e))?;
         workspace.touched(&temporary);
         Ok(Self {
@@ -164,8 +164,7 @@ impl<'a> MeshFile<'a> {
         }
         // May remain from an interrupted run whose scratch folder was deleted.
         let _ = std::fs::remove_file(&self.temporary);
-        let file = options()
-            .mode(0o666)
+        let file = public_options()
             .create_new(true)
             .open(&self.temporary)
             .map_err(|e| Error::io(&self.output, "create a file beside it", e))?;
@@ -338,9 +337,7 @@ impl<'a> MeshFile<'a> {
             fault::point(Event::Renamed);
         }
         let folder = folder_of(&self.output);
-        File::open(folder)
-            .and_then(|f| f.sync_all())
-            .map_err(|e| Error::io(folder, "sync the folder", e))
+        sync_folder(folder).map_err(|e| Error::io(folder, "sync the folder", e))
     }
 }
 

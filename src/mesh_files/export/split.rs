@@ -302,9 +302,7 @@ impl Split<'_> {
         }
         self.rename(&index)?;
         let folder = folder_of(self.options.output);
-        File::open(folder)
-            .and_then(|f| f.sync_all())
-            .map_err(|e| Error::io(folder, "sync the folder", e))
+        outcrop_platform::sync_folder(folder).map_err(|e| Error::io(folder, "sync the folder", e))
     }
 
     fn rename(&self, path: &Path) -> Result<()> {

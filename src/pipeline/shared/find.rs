@@ -5,9 +5,9 @@ use super::super::start::scratch_folder;
 use outcrop_disk::error::{Error, Remedy, Result};
 use outcrop_disk::workspace::generations::SharedFolder;
 use outcrop_mesh_files::export::folder_of;
+use outcrop_platform::{path_bytes, path_of_bytes};
 use std::ffi::{OsStr, OsString};
 use std::io::Read;
-use std::os::unix::ffi::{OsStrExt, OsStringExt};
 use std::path::{Path, PathBuf};
 
 /// Ending of the names of scratch folders.
@@ -32,7 +32,7 @@ pub(super) fn note(mesh: &Path, folder: &Path) -> Result<()> {
     }
     let path = note_of(mesh);
     let whole = std::path::absolute(folder).map_err(|e| Error::io(folder, "find", e))?;
-    let bytes = [whole.as_os_str().as_bytes(), b"\n"].concat();
+    let bytes = [&path_bytes(&whole)[..], b"\n"].concat();
     std::fs::write(&path, bytes).map_err(|e| Error::io(&path, "write", e))
 }
 
@@ -47,7 +47,7 @@ fn noted(mesh: &Path) -> Option<PathBuf> {
     let mut bytes = Vec::new();
     file.take(LONGEST).read_to_end(&mut bytes).ok()?;
     let path = bytes.strip_suffix(b"\n")?.to_vec();
-    Some(OsString::from_vec(path).into())
+    Some(path_of_bytes(path))
 }
 
 /// The folder of the run that `given` names: the folder itself, the mesh, or the folder that was given as

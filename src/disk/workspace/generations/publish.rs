@@ -10,7 +10,6 @@ use crate::workspace::open::open_existing;
 use crate::workspace::run::ResumableRun;
 use std::fs::File;
 use std::io::ErrorKind;
-use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -155,7 +154,7 @@ pub(super) fn link(from: &Path, to: &Path) -> Result<bool> {
             Ok(true)
         }
         // The reply of a server may have been lost after it made the link.
-        Err(_) if from.metadata().is_ok_and(|meta| meta.nlink() == 2) => Ok(true),
+        Err(_) if outcrop_platform::links(from) == Some(2) => Ok(true),
         Err(e) if e.kind() == ErrorKind::AlreadyExists => Ok(false),
         Err(e) => Err(Error::io(to, "link a finished journal to", e)),
     }

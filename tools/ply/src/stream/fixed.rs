@@ -6,8 +6,8 @@ use crate::error::FileError;
 use crate::header::bytes_of;
 use crate::numbers::{integer, real};
 use crate::types::Scalar;
+use outcrop_platform::FileAt;
 use std::fs::File;
-use std::os::unix::fs::FileExt;
 use std::path::PathBuf;
 
 /// The entries of an element.

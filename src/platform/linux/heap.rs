@@ -1,19 +1,15 @@
 //! Freed memory that the allocator keeps.
 
 /// True if the allocator is glibc's; others are left as they are.
-pub(super) const CAN: bool = cfg!(all(target_os = "linux", target_env = "gnu"));
+pub const CAN_TRIM: bool = cfg!(target_env = "gnu");
 
-/// Returns freed memory of `threads` and of the other threads to the system: the next stage has lists of
-/// other sizes and makes little use of it. From then on large lists are returned as soon as they are freed.
-#[cfg(all(target_os = "linux", target_env = "gnu"))]
-pub(super) fn trim(threads: &rayon::ThreadPool) {
-    glibc::trim(threads);
-}
+#[cfg(target_env = "gnu")]
+pub use glibc::trim;
 
-#[cfg(not(all(target_os = "linux", target_env = "gnu")))]
-pub(super) fn trim(_: &rayon::ThreadPool) {}
+#[cfg(not(target_env = "gnu"))]
+pub fn trim(_: impl FnOnce(&(dyn Fn() + Sync))) {}
 
-#[cfg(all(target_os = "linux", target_env = "gnu"))]
+#[cfg(target_env = "gnu")]
 #[allow(
     unsafe_code,
     reason = "it cannot be asked for otherwise, and a process is smaller by up to a seventh"
@@ -31,9 +27,9 @@ mod glibc {
     /// Freeing a list of this size makes glibc check the end of the thread's heap.
     const NOTICED: usize = 96 << 10;
 
-    pub(super) fn trim(threads: &rayon::ThreadPool) {
+    pub fn trim(on_all: impl FnOnce(&(dyn Fn() + Sync))) {
         set(libc::M_TRIM_THRESHOLD, 0);
-        threads.broadcast(|_| drop(black_box(Vec::<u8>::with_capacity(NOTICED))));
+        on_all(&|| drop(black_box(Vec::<u8>::with_capacity(NOTICED))));
         // The first setting ends the automatic adjustment by glibc.
         set(libc::M_TRIM_THRESHOLD, KEPT);
         set(libc::M_MMAP_THRESHOLD, MAPPED);
