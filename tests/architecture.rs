@@ -366,6 +366,43 @@ fn every_system_has_every_item_of_the_platform() {
     }
 }
 
+/// Functions of floats that a system has in its own library, with its own rounding. `sqrt`, `floor`, `ceil`, `round`,
+/// `%` and whole powers are exact or the same everywhere.
+const ROUNDED_BY_THE_SYSTEM: [&str; 27] = [
+    "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "cbrt", "cos", "cosh", "exp",
+    "exp2", "exp_m1", "hypot", "ln", "ln_1p", "ln_gamma", "log", "log10", "log2", "mul_add",
+    "powf", "sin", "sin_cos", "sinh", "tan", "tanh",
+];
+
+#[test]
+fn no_result_depends_on_the_library_of_the_system() {
+    let tools = ["cloudgen", "ply", "raster"];
+    let tools = tools.map(|tool| (tool, modules_of(&format!("tools/{tool}/src"))));
+    let tools = tools.into_iter().flat_map(|(tool, modules)| {
+        let named = move |(module, text)| (format!("{tool}/{module}"), text);
+        modules.into_iter().map(named)
+    });
+    let mut wrong = Vec::new();
+    for (module, text) in modules().into_iter().chain(tools) {
+        for name in ROUNDED_BY_THE_SYSTEM {
+            let calls = [
+                format!(".{name}("),
+                format!("f64::{name}"),
+                format!("f32::{name}"),
+            ];
+            let word = |rest: &str| !rest.starts_with(|c: char| c.is_alphanumeric() || c == '_');
+            let found = calls.iter().any(|call| {
+                let mut after = text.match_indices(call.as_str());
+                after.any(|(at, _)| call.ends_with('(') || word(&text[at + call.len()..]))
+            });
+            if found {
+                wrong.push(format!("{module}: {name}"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "use the crate libm: {wrong:?}");
+}
+
 #[test]
 fn files_are_about_one_thing() {
     let long: Vec<_> = modules()

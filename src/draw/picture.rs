@@ -297,8 +297,8 @@ impl Map {
     pub fn density(&self, name: &str, unit: f64) -> Result<(Picture, f64)> {
         let counts = self.all.iter().map(|all| all.load(Ordering::Relaxed));
         let most = counts.max().unwrap_or(0);
-        let whole = f64::from(most.max(2)).ln();
-        let image = self.image(|all, _| ramp(f64::from(all).ln() / whole));
+        let whole = libm::log(f64::from(most.max(2)));
+        let image = self.image(|all, _| ramp(libm::log(f64::from(all)) / whole));
         let scale = self.camera.scale / unit;
         let densest = f64::from(most) * (scale / self.cell as f64).powi(2);
         Ok((encoded(name, scale, &image)?, densest))

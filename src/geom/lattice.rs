@@ -65,7 +65,7 @@ pub struct Shift {
 /// The `f32` nearest to the exact product. Rounding the `f64` product again would round twice.
 fn single_product(a: f64, b: f64) -> f32 {
     let product = a * b;
-    let rest = a.mul_add(b, -product);
+    let rest = libm::fma(a, b, -product);
     // If anything was cut off, an odd last bit keeps the second rounding on the right side: rounding to odd.
     let is_even = product.to_bits() & 1 == 0;
     let odd = match rest {

@@ -159,7 +159,7 @@ fn scale_bar(picture: &Picture) -> Option<(f64, f64)> {
     if !about.is_finite() || about <= 0.0 {
         return None;
     }
-    let power = 10f64.powf(about.log10().floor());
+    let power = libm::exp10(libm::log10(about).floor());
     let step = [5.0, 2.0, 1.0]
         .into_iter()
         .find(|step| step * power <= about);

@@ -20,7 +20,7 @@ pub fn length(x: f64) -> String {
     if x == 0.0 || !x.is_finite() {
         return x.to_string();
     }
-    let digits = 3 - x.abs().log10().floor() as i32;
+    let digits = 3 - libm::log10(x.abs()).floor() as i32;
     if !(-4..=9).contains(&digits) {
         return format!("{x:.3e}");
     }
@@ -40,7 +40,7 @@ pub fn spread(p5: f64, p50: f64, p95: f64) -> String {
 /// A position, to a tenth of a step of the lattice on which it lies.
 pub fn position(p: [f64; 3], step: f64) -> String {
     let decimals = match step {
-        step if step > 0.0 && step < 1.0 => (-step.log10().floor()) as usize + 1,
+        step if step > 0.0 && step < 1.0 => (-libm::log10(step).floor()) as usize + 1,
         _ => 1,
     };
     let text = |x: f64| {

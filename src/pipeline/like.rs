@@ -61,7 +61,7 @@ impl Like<'_> {
             comments,
             bounds: corners.map(|corners| corners.map(moved)),
             // A hundred-millionth of the span, about.
-            decimals: (8.0 - span.log10().ceil()).clamp(0.0, 17.0) as usize,
+            decimals: (8.0 - libm::log10(span).ceil()).clamp(0.0, 17.0) as usize,
             ..Mesh::default()
         };
         Ok((about, shift))

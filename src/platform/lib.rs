@@ -9,7 +9,7 @@
 //! |---|---|---|
 //! | Linux | `linux.rs`, `unix.rs` | all tests run there |
 //! | macOS | `macos.rs`, `unix.rs` | by review only |
-//! | Windows | `windows.rs` | by review only |
+//! | Windows | `windows.rs` | its tests run under wine |
 
 pub mod files;
 pub mod names;

@@ -142,7 +142,7 @@ fn unlike_sizes(boxes: &[Extent<'_>]) -> Option<String> {
 
 /// A length rounded to three digits.
 fn rounded(length: f64) -> f64 {
-    let unit = 10f64.powf(length.log10().floor() - 2.0);
+    let unit = libm::exp10(libm::log10(length).floor() - 2.0);
     if unit >= 1.0 && unit.is_finite() {
         (length / unit).round() * unit
     } else {

@@ -37,7 +37,7 @@ impl Spool {
 pub fn enough_for(step: f64, largest: f64) -> CoordinateType {
     // Rounding to single precision moves a coordinate by at most 2^-24 of the largest power of two not above
     // it; for zero this is zero.
-    let half_unit = largest.log2().floor().exp2() * 2f64.powi(-24);
+    let half_unit = libm::exp2(libm::log2(largest).floor()) * 2f64.powi(-24);
     if half_unit < step / 10.0 {
         CoordinateType::F32
     } else {

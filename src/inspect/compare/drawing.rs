@@ -70,7 +70,7 @@ impl Sketch {
     /// Draws a sample, whose distance is compared with the `diagonal` of the shape.
     pub(super) fn sample(&self, p: V3, distance: f64, diagonal: f64) {
         let p = sub(p, self.middle);
-        let share = 1.0 + (distance / diagonal).log10() / DECADES;
+        let share = 1.0 + libm::log10(distance / diagonal) / DECADES;
         let share = if share.is_finite() { share } else { 0.0 };
         for canvas in &self.canvases {
             canvas.point(p, POINT, share, LIFT);
@@ -91,7 +91,7 @@ impl Sketch {
         workspace: &Workspace,
     ) -> Result<Vec<Picture>> {
         let scale = |share: f64| {
-            let distance = diagonal * 10f64.powf((share - 1.0) * DECADES);
+            let distance = diagonal * libm::exp10((share - 1.0) * DECADES);
             if top > 0.0 { distance / top } else { 0.0 }
         };
         workspace.install(|| {

@@ -11,7 +11,7 @@ pub(super) fn collinear(points: [[f64; 3]; 3]) -> bool {
     // Scaling by a power of two rounds nothing and avoids overflow of products.
     let all = points.iter().flatten();
     let largest = all.fold(f64::MIN_POSITIVE, |m, c| m.max(c.abs()));
-    let scale = -(largest.log2().clamp(-1000.0, 1000.0) as i32);
+    let scale = -(libm::log2(largest).clamp(-1000.0, 1000.0) as i32);
     let points = points.map(|p| p.map(|c| c * 2f64.powi(scale)));
     !PLANES.iter().any(|&plane| turns(points, plane))
 }
@@ -39,7 +39,7 @@ fn turns([p, q, r]: [[f64; 3]; 3], [x, y]: [usize; 2]) -> bool {
     for (a, b) in products {
         let product = a * b;
         sum.add(product);
-        sum.add(a.mul_add(b, -product));
+        sum.add(libm::fma(a, b, -product));
     }
     !sum.is_zero()
 }

@@ -66,7 +66,7 @@ pub(super) fn plan(
                 .max(high[2] - low[2]);
             // A round number with three digits of the thickness.
             let thickness = (THICKNESS * side).max(f64::MIN_POSITIVE);
-            let step = 10f64.powf(thickness.log10().floor() - 2.0);
+            let step = libm::exp10(libm::log10(thickness).floor() - 2.0);
             ((low[2] - thickness) / step).floor() * step
         }
     };

@@ -76,8 +76,8 @@ impl Camera {
     /// A camera that sees all `positions`, as far as the framing says so.
     #[must_use]
     pub fn new(view: View, framing: Framing, positions: &[Vec3]) -> Self {
-        let (sin_a, cos_a) = view.azimuth.to_radians().sin_cos();
-        let (sin_e, cos_e) = view.elevation.to_radians().sin_cos();
+        let (sin_a, cos_a) = libm::sincos(view.azimuth.to_radians());
+        let (sin_e, cos_e) = libm::sincos(view.elevation.to_radians());
         let towards = [cos_a * cos_e, sin_a * cos_e, sin_e];
         let right = [-sin_a, cos_a, 0.0];
         let up = cross(towards, right);

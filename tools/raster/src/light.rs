@@ -112,7 +112,7 @@ impl Light {
                 rise += f64::from(other - own).max(0.0);
             }
         }
-        (-self.relief * rise / 8.0).exp().max(0.25)
+        libm::exp(-self.relief * rise / 8.0).max(0.25)
     }
 }
 

@@ -49,7 +49,7 @@ impl Matrix {
     fn after(&self, inner: &Self) -> Self {
         Self(self.0.map(|row| {
             std::array::from_fn(|column| {
-                let sum = (0..3).fold(0.0, |sum, k| row[k].mul_add(inner.0[k][column], sum));
+                let sum = (0..3).fold(0.0, |sum, k| libm::fma(row[k], inner.0[k][column], sum));
                 if column == 3 { sum + row[3] } else { sum }
             })
         }))
