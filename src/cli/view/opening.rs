@@ -5,7 +5,7 @@ use outcrop_disk::error::{Error, Result, Setting};
 use outcrop_disk::workspace::lock;
 use outcrop_disk::workspace::outlook::Planned;
 use outcrop_disk::workspace::progress::Observer;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::sync::{Arc, Mutex};
 
 /// What is done once, when the page has something to show: at the latest when the first part of it is there, and
@@ -93,19 +93,9 @@ impl Observer for Beginning {
 
 /// Opens a browser, if there is one.
 fn open(url: &str) {
-    let (program, before): (&str, &[&str]) = if cfg!(target_os = "macos") {
-        ("open", &[])
-    } else if cfg!(windows) {
-        ("cmd", &["/C", "start", ""])
-    } else {
-        let screen = |name| std::env::var_os(name).is_some_and(|value| !value.is_empty());
-        if !["DISPLAY", "WAYLAND_DISPLAY"].into_iter().any(screen) {
-            return;
-        }
-        ("xdg-open", &[])
+    let Some(mut command) = outcrop_platform::browser(url) else {
+        return;
     };
-    let mut command = Command::new(program);
-    command.args(before).arg(url);
     let silent = command
         .stdin(Stdio::null())
         .stdout(Stdio::null())

@@ -14,7 +14,7 @@ mod weld;
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::compressed::plain_name;
-use outcrop_platform::FileAt;
+use outcrop_platform::{FileAt, modified};
 use spool::Spool;
 use std::fs::File;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -74,7 +74,7 @@ impl<'a> Mesh<'a> {
         let about = std::fs::metadata(self.shown);
         let about = about.map_err(|e| Error::io(self.shown, "read the size of", e))?;
         let mut hasher = DefaultHasher::new();
-        (self.shown, about.len(), about.mtime(), about.mtime_nsec()).hash(&mut hasher);
+        (self.shown, about.len(), modified(&about)).hash(&mut hasher);
         let name = format!("mesh-{:016x}", hasher.finish());
         if let Some(path) = spool::finished(&name, self.workspace)? {
             return Ok(path);
