@@ -41,7 +41,11 @@ pub fn read(bytes: &[u8]) {
         crop,
         ..Params::default()
     };
-    match ingest_selected(std::slice::from_ref(&ept), &params.selection(), &bench.workspace) {
+    match ingest_selected(
+        std::slice::from_ref(&ept),
+        &params.selection(),
+        &bench.workspace,
+    ) {
         Ok(spool) => {
             cloud::check(&spool);
             spool.release(&bench.workspace).expect("a spool");
