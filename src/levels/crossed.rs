@@ -72,7 +72,7 @@ fn mixed(number: u64) -> u64 {
     x ^ (x >> 31)
 }
 
-/// Tests at most `most` triangles of a mesh, and [`MOST`]. `name` is that of the step.
+/// Tests at most `most` triangles of a mesh, and never more than 262 144. `name` is that of the step.
 ///
 /// # Errors
 /// [`outcrop_disk::error::Error::Input`] for a file that is no mesh; [`outcrop_disk::error::Error::Memory`],
