@@ -158,7 +158,7 @@ pub fn is_private(path: &Path, about: &Metadata) -> io::Result<bool> {
     if about.is_symlink() {
         return Ok(false);
     }
-    if !has_access_lists(path)? {
+    if !has_access_lists(path) {
         return Ok(true);
     }
     let user = User::of_process()?;

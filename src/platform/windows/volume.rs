@@ -11,7 +11,7 @@ use std::path::Path;
 use std::ptr::null_mut;
 use windows_sys::Win32::Storage::FileSystem::{
     BY_HANDLE_FILE_INFORMATION, FILE_FLAG_BACKUP_SEMANTICS, GetDiskFreeSpaceExW, GetDriveTypeW,
-    GetFileInformationByHandle, GetVolumeInformationW, GetVolumePathNameW,
+    GetFileInformationByHandle, GetVolumeInformationByHandleW, GetVolumePathNameW,
 };
 use windows_sys::Win32::System::Memory::{PrefetchVirtualMemory, WIN32_MEMORY_RANGE_ENTRY};
 use windows_sys::Win32::System::SystemServices::FILE_PERSISTENT_ACLS;
@@ -68,24 +68,22 @@ pub fn is_local(path: &Path) -> bool {
     path.exists() && [DRIVE_FIXED, DRIVE_REMOVABLE, DRIVE_RAMDISK].contains(&kind)
 }
 
-/// True if the volume of a path keeps who may open its files.
-pub(super) fn has_access_lists(path: &Path) -> io::Result<bool> {
-    let (root, mut flags, none) = (root(path)?, 0, null_mut::<u16>());
-    // SAFETY: the path ends in 0, the answer has the room of a number, and no other answer is wanted.
-    check(unsafe {
-        let (name, number) = (none, none.cast());
-        GetVolumeInformationW(
-            root.as_ptr(),
-            name,
-            0,
-            number,
-            number,
-            &raw mut flags,
-            name,
-            0,
-        )
-    })?;
-    Ok(flags & FILE_PERSISTENT_ACLS != 0)
+/// True if the volume of a folder keeps who may open its files, also if that cannot be had: the lists then tell.
+pub(super) fn has_access_lists(folder: &Path) -> bool {
+    let mut options = File::options();
+    options
+        .access_mode(0)
+        .custom_flags(FILE_FLAG_BACKUP_SEMANTICS);
+    let Ok(folder) = options.open(folder) else {
+        return true;
+    };
+    let (mut flags, name, number) = (0, null_mut(), null_mut());
+    let handle = folder.as_raw_handle();
+    // SAFETY: the handle is open, the answer has the room of a number, and no other answer is wanted.
+    let told = unsafe {
+        GetVolumeInformationByHandleW(handle, name, 0, number, number, &raw mut flags, name, 0)
+    };
+    told == 0 || flags & FILE_PERSISTENT_ACLS != 0
 }
 
 /// What cannot be read is noticed later, and then ends the process.
