@@ -26,7 +26,10 @@ fn the_version_is_that_of_program_method_commit_and_features() {
     let start = format!("outcrop {} (method 3, commit ", env!("CARGO_PKG_VERSION"));
     let rest = said.out.strip_prefix(&start).expect(&said.out);
     let (found, rest) = rest.split_once(", ").expect(&said.out);
-    assert_eq!(rest, "features demo, e57, levels, pages, view, faults)\n");
+    assert_eq!(
+        rest,
+        "features cloud, demo, e57, levels, pages, view, faults)\n"
+    );
     if let Some(commit) = commit() {
         assert!(found == commit, "{found} is not {commit}");
     }

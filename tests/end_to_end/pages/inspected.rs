@@ -100,7 +100,6 @@ fn defects_are_shown_where_they_are() {
         &[0, 1, 77],
         &[8, 1, 2],
         &[6, 6, 7],
-        &[0, 1, 2, 3],
     ];
     let mesh = bench.write("bad.ply", ascii(&vertices, &faces));
     let (page, json) = page_of("verify", &bench, &[&mesh], 1);
