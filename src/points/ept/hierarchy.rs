@@ -86,8 +86,14 @@ pub(super) fn read(input: &Input, info: &Info, target: &SourceWriter<'_>) -> Res
         let name = format!("ept-hierarchy/{}.json", page.name());
         let text = input.beside(&name, LONGEST)?;
         let held = workspace.reserve("EPT hierarchy file", 8 * text.len() as u64)?;
-        let map: BTreeMap<String, i64> = serde_json::from_slice(&text)
-            .map_err(|e| damaged(input, &name, e.to_string(), "numbers of points of nodes"))?;
+        let map: BTreeMap<String, i64> = serde_json::from_slice(&text).map_err(|e| {
+            damaged(
+                input,
+                &name,
+                e.to_string().escape_debug().to_string(),
+                "numbers of points of nodes",
+            )
+        })?;
         let more = (map.len() * 3 * size_of::<Node>()) as u64;
         let old = memory.bytes();
         memory.at_least(old + more)?;

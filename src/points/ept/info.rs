@@ -177,7 +177,11 @@ impl Info {
         let text = input.head(LONGEST as usize)?;
         let raw: Raw = serde_json::from_slice(&text).map_err(|e| {
             let place = format!("line {}", e.line());
-            input.error(place, e.to_string(), "a description of Entwine Point Tiles")
+            input.error(
+                place,
+                e.to_string().escape_debug().to_string(),
+                "a description of Entwine Point Tiles",
+            )
         })?;
         let cube = bounds(input, "bounds", raw.bounds)?;
         let conforming = match raw.bounds_conforming {

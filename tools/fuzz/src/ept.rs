@@ -28,9 +28,8 @@ pub fn read(bytes: &[u8]) {
         // A node whose file is not there.
         Error::Io { source, .. } if source.kind() == std::io::ErrorKind::NotFound => {}
         Error::Io { source, .. } if source.kind() == std::io::ErrorKind::InvalidData => {}
-        // The file at fault is one of the set.
-        Error::Input { path, .. } if path.starts_with(&folder) => check_error(error, path),
-        error => check_error(error, &ept),
+        // The file at fault may be any of the set.
+        error => check_error(error, &folder),
     };
     if let Err(error) = probe(&ept) {
         checked(&error);
