@@ -1,46 +1,28 @@
 //! Small files in the folder of a remote file, read whole.
 
-use super::agent::Counts;
 use super::ahead::Ahead;
 use super::answer::Answer;
 use super::errors::told;
-use super::location::Location;
-use super::object::{again, ask};
-use super::stores::{Patience, Place, place};
+use super::object::{Object, again, ask};
+use super::stores::Place;
 use bytes::Bytes;
 use object_store::path::Path;
 use std::io;
-use std::sync::Arc;
 
 /// The folder of a remote file.
 #[derive(Debug, Clone)]
-pub struct Beside {
-    place: Place,
-    counts: Arc<Counts>,
-}
+pub struct Beside(Place);
 
 impl Beside {
-    /// The folder that has the file at `location`.
+    /// The folder that has `object`, asked by the same client.
     ///
     /// # Errors
-    /// As [`super::Object::open`].
-    pub fn of(location: &Location, counts: &Arc<Counts>) -> io::Result<Self> {
-        let (store, path) = place(location, Patience::Long, counts).map_err(told)?;
-        let folder = path
-            .as_ref()
-            .rsplit_once('/')
-            .map_or("", |(folder, _)| folder);
-        let folder = Path::parse(folder).map_err(|e| told(e.into()))?;
-        Ok(Self {
-            place: (store, folder),
-            counts: counts.clone(),
-        })
-    }
-
-    /// Requests and bytes so far.
-    #[must_use]
-    pub fn counts(&self) -> &Counts {
-        &self.counts
+    /// [`io::ErrorKind::Other`] for a path that the store does not take.
+    pub fn of(object: &Object) -> io::Result<Self> {
+        let (store, path) = &object.file.place;
+        let folder = path.as_ref().rsplit_once('/');
+        let folder = Path::parse(folder.map_or("", |(folder, _)| folder));
+        Ok(Self((store.clone(), folder.map_err(|e| told(e.into()))?)))
     }
 
     /// The bytes of the file `name`, which may have slashes; at most `most`.
@@ -48,7 +30,7 @@ impl Beside {
     /// # Errors
     /// [`io::ErrorKind::NotFound`]; [`io::ErrorKind::InvalidData`] for a larger file; as [`super::Object::open`].
     pub fn read(&self, name: &str, most: u64) -> io::Result<Bytes> {
-        let (store, folder) = &self.place;
+        let (store, folder) = &self.0;
         let path = match folder.as_ref() {
             "" => Path::parse(name),
             folder => Path::parse(format!("{folder}/{name}")),

@@ -35,7 +35,7 @@ pub struct Object {
 /// What a request for a part of the file needs.
 #[derive(Debug)]
 pub(crate) struct Remote {
-    place: Place,
+    pub(crate) place: Place,
     /// Size in bytes.
     size: u64,
     /// What changes with the content, if the server says it.
@@ -50,8 +50,8 @@ impl Object {
     /// Opens a remote file: asks for its size, its version and its first bytes.
     ///
     /// # Errors
-    /// [`ErrorKind::NotFound`], [`ErrorKind::PermissionDenied`]; [`ErrorKind::Unsupported`] if the server knows no
-    /// ranges; anything else that ends a request, after some seconds.
+    /// [`ErrorKind::NotFound`], [`ErrorKind::PermissionDenied`]; anything else that ends a request, after
+    /// some seconds.
     pub fn open(location: &Location, counts: &Arc<Counts>) -> io::Result<Self> {
         let first = place(location, Patience::Short, counts).map_err(told)?;
         let (got, has_parts) = match ask(&first, Some(0..HEAD), None) {
@@ -109,12 +109,6 @@ impl Object {
     /// Requests and bytes so far.
     #[must_use]
     pub fn counts(&self) -> &Counts {
-        &self.file.counts
-    }
-
-    /// The same, to be shared with other files.
-    #[must_use]
-    pub fn shared_counts(&self) -> &Arc<Counts> {
         &self.file.counts
     }
 

@@ -88,7 +88,7 @@ impl Remote {
 
     /// The files in its folder.
     pub(in super::super) fn beside(&self, path: &Path) -> Result<Beside> {
-        let beside = outcrop_remote::Beside::of(&location(path)?, self.object.shared_counts());
+        let beside = outcrop_remote::Beside::of(&self.object);
         beside.map(Beside).map_err(|e| Error::io(path, "open", e))
     }
 }
