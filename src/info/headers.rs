@@ -1,4 +1,4 @@
-//! What the headers of files say, without reading their points.
+//! Describes a cloud from the headers of its files, without reading points.
 
 use outcrop_disk::error::Result;
 use outcrop_points::{Fetched, Layout, Probe, expand, probe_as};
@@ -17,7 +17,7 @@ pub struct Headers {
     pub points: u64,
     /// Lowest and highest coordinates, each in the unit of its file; none if no header gives any.
     pub bounds: Option<[[f64; 3]; 2]>,
-    /// What was asked of servers, if there are any.
+    /// Requests to servers and bytes of their answers; none if all files are local.
     pub fetched: Option<Fetched>,
 }
 

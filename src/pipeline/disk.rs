@@ -6,7 +6,8 @@
 //! determine: where noise makes more triples it makes fewer triangles, so scratch and mesh together have the
 //! same size otherwise. Half a store is assumed, which is wrong by 4 bytes a point either way.
 //!
-//! What is made of the whole mesh comes after it (`after`): a smaller mesh takes several times its size.
+//! A smaller or closed mesh, or levels of detail, are made from the whole mesh and need scratch after it (`after`): a
+//! smaller mesh several times the bytes of the whole one.
 //!
 //! Unneeded files are not counted. They are deleted as soon as the deletion is synced
 //! (`workspace/keeper.rs`), within a moment.

@@ -8,8 +8,8 @@ use outcrop_disk::workspace::progress::Observer;
 use std::process::Stdio;
 use std::sync::{Arc, Mutex};
 
-/// What is done once, when the page has something to show: at the latest when the first part of it is there, and
-/// before that when the work on it begins. What is refused before that gets its message, and no page.
+/// Opens the page once: as soon as the work on its first part begins, or at the latest when that part is there. If the
+/// input is refused before that, there is a message and no page.
 pub struct Opening {
     pub url: String,
     /// True if a browser is to be opened.

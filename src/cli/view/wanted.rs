@@ -1,4 +1,4 @@
-//! What is to be shown, by the arguments, and what of it is refused before any work.
+//! The meshes and points that the arguments name; invalid ones are refused before any work.
 
 use super::super::args::View;
 use outcrop_disk::error::{Error, Result};
@@ -31,7 +31,7 @@ impl Source<'_> {
         }
     }
 
-    /// What tells where it lies.
+    /// The source of its reference system: the tileset, or the EPSG code of a mesh.
     fn place(&self) -> Result<Place<'_>> {
         Ok(match self {
             Self::Folder(folder) => Place::Folder(folder),

@@ -131,7 +131,7 @@ fn thin(
     Ok((even, colors))
 }
 
-/// What the tileset says of the cloud, as that of a mesh does.
+/// The facts of the cloud that the tileset names: the same as of a mesh.
 fn noted(spool: &Spool, lattice: &Lattice, source: &str) -> Value {
     let crs = spool.stats().crs.as_ref();
     let text = spool.wkt().map(str::to_owned);

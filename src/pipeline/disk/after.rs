@@ -1,4 +1,5 @@
-//! What is made of the whole mesh, which is a hidden file beside it until then.
+//! Disk need of the steps after the whole mesh: they make a smaller or closed one, or levels of detail, and read the
+//! whole one from a hidden file beside the output.
 
 use super::Known;
 use crate::params::Params;

@@ -35,7 +35,7 @@ fn file(encoding: &str, header: &str, numbers: &[(&str, f64)]) -> Vec<u8> {
 
 const ENCODINGS: [&str; 3] = ["ascii", "binary_little_endian", "binary_big_endian"];
 
-/// What a run warns of.
+/// Collects the warnings of a run.
 #[derive(Default)]
 struct Said(Mutex<Vec<String>>);
 
@@ -102,7 +102,7 @@ fn ply_of_other_programs_is_read_in_each_encoding() {
 const TRIANGLE: &str = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n\
                         element face 1\nproperty list int int vertex_indices\n";
 
-/// What has triangles in entries of one size is not copied.
+/// A mesh whose faces all take the same number of bytes is read where it is, not copied.
 #[test]
 fn ply_of_triangles_is_read_where_it_is() {
     let numbers = |corners: &[i32]| {
