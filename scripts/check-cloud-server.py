@@ -61,6 +61,7 @@ class Handler(http.server.BaseHTTPRequestHandler):
                 return self.plain(416)
         self.send_response(status)
         self.send_header("ETag", tag)
+        self.send_header("Last-Modified", self.date_time_string(os.path.getmtime(path)))
         if status == 206:
             self.send_header("Content-Range", f"bytes {start}-{end - 1}/{size}")
         self.send_header("Content-Length", str(end - start))

@@ -39,6 +39,8 @@ enum Plan {
     Fail(Event, i32, u64),
     /// A format of meshes with a limit holds this number of bytes.
     Most(u64),
+    /// A process whose files are in a store gives a sign of life after each so many milliseconds.
+    Beat(u64),
     /// Write the number of events of each kind to this file.
     Count(PathBuf),
 }
@@ -58,6 +60,7 @@ impl Plan {
             "sync" => Self::Fail(Event::Sync, DISK_FAILS, number),
             "hold" => Self::Hold(number),
             "most" => Self::Most(number),
+            "beat" => Self::Beat(number),
             _ => {
                 let (event, _) = EVENTS.iter().find(|(_, name)| *name == kind)?;
                 Self::Kill(*event, number)
@@ -109,6 +112,13 @@ impl Faults for Planned {
         match self.plan {
             Plan::Most(number) => number,
             _ => bytes,
+        }
+    }
+
+    fn beat(&self, usual: Duration) -> Duration {
+        match self.plan {
+            Plan::Beat(number) => Duration::from_millis(number),
+            _ => usual,
         }
     }
 
@@ -178,6 +188,13 @@ mod tests {
                 assert_eq!(faults.at(event).unwrap_err().kind(), kind, "{text}");
             }
         }
+    }
+
+    #[test]
+    fn signs_of_life_come_as_often_as_a_test_says() {
+        let usual = Duration::from_secs(60);
+        assert_eq!(planned("beat:200").beat(usual), Duration::from_millis(200));
+        assert_eq!(planned("most:200").beat(usual), usual);
     }
 
     #[test]

@@ -22,7 +22,7 @@ macro_rules! feature {
     };
 }
 
-const CLOUD: Feature = feature!("cloud", "files behind URLs");
+pub(crate) const CLOUD: Feature = feature!("cloud", "files behind URLs");
 pub(crate) const DEMO: Feature = feature!("demo", "the demonstration");
 const E57: Feature = feature!("e57", "E57");
 pub(crate) const LEVELS: Feature = feature!("levels", "levels of detail");

@@ -50,9 +50,9 @@
 //! [`convert`] writes a finished mesh in another format.
 //!
 //! [`Closing`] closes the boundary of a mesh of any size, [`Simplification`] makes one mesh with fewer triangles of it, and [`Tiles`] levels of detail for
-//! viewers of 3D Tiles.
+//! viewers of 3D Tiles. [`Rasterization`] makes rasters of heights.
 //!
-//! [`inspect`] describes a cloud, checks that a mesh is a manifold, and measures the distance between two
+//! [`inspect`] describes a cloud, checks that a mesh is a manifold, and measures volumes, heights, and the distance between two
 //! shapes. [`Report`] has the counts and measurements of a run. [`page`] puts all of these into pages with
 //! pictures.
 //!
@@ -67,6 +67,7 @@
 #[doc(hidden)]
 pub mod cli;
 pub mod convert;
+mod deliver;
 #[cfg(feature = "faults")]
 mod faults;
 mod features;
@@ -88,11 +89,13 @@ pub use outcrop_view as view;
 /// Inspection of clouds and meshes without a reconstruction.
 pub mod inspect {
     pub use crate::info;
-    pub use outcrop_inspect::{compare, verify};
+    pub use outcrop_inspect::{change, compare, verify};
+    pub use outcrop_survey::{raster, volume};
 }
 
 #[doc(inline)]
 pub use cli::call;
+pub use deliver::Uploaded;
 pub use error::{Error, Result};
 pub use outcrop_disk::workspace::Workspace;
 pub use outcrop_disk::workspace::memory::MemoryPool;
@@ -103,7 +106,9 @@ pub use params::{
     Division, Facing, InputNormals, MaxWidth, Method, Origin, Params, Radius, Region, Smooth,
     Smoothing,
 };
-pub use pipeline::{Builder, Reconstruction, Start, default_memory, default_threads};
+pub use pipeline::{
+    Builder, Rasterization, Reconstruction, Start, default_memory, default_threads,
+};
 #[cfg(feature = "levels")]
 pub use pipeline::{Closing, Simplification, Tiles};
 #[cfg(feature = "levels")]

@@ -3,20 +3,20 @@
 mod attempt;
 mod beside;
 mod builder;
+mod change;
 mod checks;
 mod clock;
 #[cfg(feature = "levels")]
 mod close;
 mod disk;
 mod levels;
-#[cfg(feature = "levels")]
 mod like;
 mod made;
 mod manifest;
-#[cfg(feature = "levels")]
 mod mesh_job;
 mod origin;
 mod outlook;
+mod raster;
 mod resources;
 mod shared;
 #[cfg(feature = "levels")]
@@ -26,10 +26,14 @@ mod start;
 #[cfg(feature = "levels")]
 mod tiles;
 
+use crate::deliver::Delivery;
 use crate::params::Params;
 use crate::report::Report;
 use attempt::Alarm;
 pub use builder::Builder;
+pub use change::change;
+#[cfg(feature = "pages")]
+pub use change::illustrated_change;
 use checks::{not_an_input, one_system, writable};
 pub(crate) use clock::Clock;
 #[cfg(feature = "levels")]
@@ -39,9 +43,11 @@ use outcrop_disk::error::Result;
 use outcrop_disk::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
 use outcrop_disk::workspace::progress::{Cancel, Observer};
 use outcrop_disk::workspace::{Folder, Storage, Workspace, limits};
+pub use raster::Rasterization;
 pub use shared::{
-    Advanced, Begun, Status, TaskState, Totals, Worked, planned_shards, shared_folder, status,
+    Advanced, Begun, Status, TaskState, Totals, Worked, part_of, shared_folder, status,
 };
+pub(crate) use shared::{Copies, planned_shards};
 #[cfg(feature = "levels")]
 pub use simplify::Simplification;
 use stages::Stages;
@@ -64,6 +70,8 @@ pub struct Reconstruction {
     made: Option<PathBuf>,
     /// The folder of the tileset, if that is wanted.
     tiles: Option<PathBuf>,
+    /// The way of the output to a store, if it is behind a URL: the paths above are then of files on this machine.
+    delivery: Option<Delivery>,
     folder: PathBuf,
     /// True if the run was found by its folder.
     goes_on: bool,
@@ -78,6 +86,7 @@ pub struct Reconstruction {
     start: Start,
     time_limit: Option<Duration>,
     pictures: bool,
+    copies: shared::Copies,
 }
 
 /// Half of the memory that machine and cgroup allow.
@@ -139,6 +148,10 @@ impl Reconstruction {
     /// Any [`crate::Error`]; an existing output file is then unchanged. Scratch files are deleted, unless the
     /// run can be resumed, see [`Reconstruction::is_unfinished`].
     pub fn run(&self) -> Result<Report> {
+        if let Some(delivery) = &self.delivery {
+            delivery.refuse_inputs(&outcrop_points::expand(&self.inputs)?)?;
+            delivery.prepare()?;
+        }
         writable(&self.mesh)?;
         if let Some(made) = &self.made {
             writable(made)?;
@@ -191,6 +204,7 @@ impl Reconstruction {
         stages.draw(&store, &shape, &repaired, pieces.as_ref(), blocks, &lattice)?;
         stages.make_of_whole()?;
         stages.levels()?;
+        stages.deliver()?;
         Ok(stages.report())
     }
 }

@@ -3,6 +3,7 @@
 mod close;
 mod simplify;
 
+use crate::deliver::Uploaded;
 use crate::params::Params;
 pub use close::CloseReport;
 pub use histogram::{Bin, Histogram};
@@ -107,6 +108,8 @@ pub struct Report {
     pub tiles: Option<TilesReport>,
     /// The mesh with fewer triangles, if it was asked for; `mesh` is then the one of which it was made.
     pub simplified: Option<SimplifyReport>,
+    /// What was sent to a store, if the output is behind a URL.
+    pub uploaded: Option<Uploaded>,
     /// Type of the coordinates in the file.
     pub coordinates: CoordinateType,
     /// The position of the cloud that is the origin of the mesh's coordinates; none if that is the same as the
@@ -204,6 +207,11 @@ pub struct StageReport {
     pub name: &'static str,
     /// Wall-clock seconds.
     pub seconds: f64,
+    /// Processor time of all threads, in seconds.
+    pub cpu_seconds: f64,
+    /// Seconds that more threads would not have made shorter, if in all others every thread worked: `(threads × seconds −
+    /// cpu_seconds) / (threads − 1)`.
+    pub serial_seconds: f64,
     /// Bytes read from files.
     pub bytes_read: u64,
     /// Bytes written to files.

@@ -49,7 +49,7 @@ pub(crate) fn write(
             writer.finish()
         })
         .and_then(|()| {
-            std::fs::rename(&temporary, output)
+            outcrop_platform::rename(&temporary, output)
                 .map_err(|e| Error::io(output, "rename the finished file to it", e))
         });
     if written.is_err() {

@@ -10,15 +10,19 @@ use std::path::Path;
 /// Each room, and the rooms of the same crate whose items it may use. A room is a folder or file of a crate with
 /// several steps, or of the program.
 const MAY_USE: &[(&str, &str)] = &[
-    ("cli", "faults features info page params pipeline report"),
+    (
+        "cli",
+        "deliver faults features info page params pipeline report",
+    ),
     ("convert", "write"),
+    ("deliver", "features"),
     ("faults", ""),
     ("features", ""),
     ("info", "params pipeline"),
     ("page", "info report"),
     ("params", ""),
-    ("pipeline", "features params report write"),
-    ("report", "params"),
+    ("pipeline", "deliver features params report write"),
+    ("report", "deliver params"),
     ("write", ""),
     ("disk/error", ""),
     ("disk/spill", "disk/error disk/workspace"),

@@ -14,7 +14,7 @@ const SHORT: [(&str, usize); 2] = [("README.md", 200), ("ARCHITECTURE.md", 200)]
 const WIDTH: usize = 110;
 
 /// Options that documents give to other programs: cargo, scripts and tools.
-const OTHERS: [&str; 12] = [
+const OTHERS: [&str; 14] = [
     "--address",
     "--draft",
     "--features",
@@ -23,8 +23,10 @@ const OTHERS: [&str; 12] = [
     "--kind",
     "--large",
     "--no-default-features",
+    "--others",
     "--quick",
     "--seconds",
+    "--short",
     "--strict",
     "--tried",
 ];
@@ -137,6 +139,9 @@ fn of_commands() -> BTreeMap<&'static str, BTreeSet<String>> {
         "info",
         "verify",
         "compare",
+        "change",
+        "volume",
+        "raster",
         "simplify",
         "close",
         "tiles",

@@ -9,13 +9,13 @@ from __future__ import annotations
 import contextlib
 import datetime
 import os
-import shutil
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Executor
 from typing import Any, Optional, Union
 
 import numpy as np
 
-from . import _outcrop
+from . import _outcrop, _system
 from ._mesh import Mesh
 from ._points import Cloud, temporary, temporary_folder, written
 from ._run import (
@@ -31,9 +31,11 @@ from ._run import (
     Path,
     Progress,
     ScratchError,
+    is_url,
     run,
     words,
 )
+from ._shared import plan_words, share
 
 __all__ = [
     "Answer",
@@ -47,16 +49,22 @@ __all__ = [
     "OutcropWarning",
     "ParameterError",
     "ScratchError",
+    "change",
     "close",
     "compare",
     "info",
+    "raster",
     "reconstruct",
     "simplify",
     "tiles",
     "verify",
+    "volume",
 ]
 
 __version__ = _outcrop.__version__
+
+# Tasks that share a run must all have the same extension.
+_outcrop.part_of(str(_outcrop.__file__))
 
 Size = Union[int, str]
 Time = Union[float, str, datetime.timedelta]
@@ -117,37 +125,49 @@ def reconstruct(
     restart: bool = False,
     time_limit: Optional[Time] = None,
     report: Union[Path, Sequence[Path], None] = None,
+    executor: Optional[Executor] = None,
+    shards: int = 16,
 ) -> Mesh:
     """Makes a mesh from points.
 
     ``points`` is an array (n x 3), a file or folder of points, or a list of them. ``colors`` (n x 3, uint8 or uint16)
     and ``columns`` (arrays by name) are values of the points of an array; the mesh keeps them. Of text files
     ``columns`` has the names of the columns in their order, such as ``"x,y,z,intensity,-"``. Without ``output`` the mesh
-    is in a temporary file, which is deleted with the :class:`Mesh`.
+    is in a temporary file, which is deleted with the :class:`Mesh`. ``output`` may be the URL of a file in a store, such
+    as ``"s3://bucket/mesh.ply"``; its arrays are not here then.
 
     ``progress`` is a function of the name of the stage, the items done, and the items in all (0 if unknown), or
     ``True`` for bars of tqdm, which notebooks show by default. Time limits are texts such as ``"7h30m"``, or seconds.
+
+    With an ``executor`` (:class:`concurrent.futures.Executor`: a pool of processes, Dask, MPI, Parsl) the work is divided
+    into ``shards``, which it runs in whatever processes it has; ``memory`` (2 GiB) and ``threads`` (1) are those of each
+    of them. They must see ``points``, and ``output`` and ``scratch``, under the same names.
     """
     options = dict(locals())
-    for name in ("points", "output", "colors", "columns", "progress"):
+    for name in ("points", "output", "colors", "columns", "progress", "executor", "shards"):
         del options[name]
     if output is None and (resume or restart):
         raise ParameterError("resume, restart: a run without output= cannot be resumed")
     with contextlib.ExitStack() as stack:
         folder = None
+        store = executor is not None and "://" in os.fsdecode(scratch or "")
         if output is None:
-            folder = temporary_folder(scratch)
+            folder = temporary_folder(None if store else scratch)
             failed = stack.enter_context(contextlib.ExitStack())
-            failed.callback(shutil.rmtree, folder, True)
-            output, options["scratch"] = os.path.join(folder, "mesh.ply"), folder
+            failed.callback(_system.discard, folder)
+            output = os.path.join(folder, "mesh.ply")
+            if not store:
+                options["scratch"] = folder
         inputs = _paths(points)
         if inputs is None:
+            if store:
+                raise ParameterError("points: with scratch in a store these are files or URLs that workers see")
             if columns is not None and not isinstance(columns, Mapping):
                 raise ParameterError("columns: of points in an array these are arrays by name")
             cloud = Cloud(points, colors, columns)
             if cloud.names and attributes == "none":
                 options["attributes"] = cloud.names
-            output = os.path.abspath(output)
+            output = os.fspath(output) if is_url(output) else os.path.abspath(output)
             if options["scratch"] is not None:
                 options["scratch"] = os.path.abspath(options["scratch"])
             place = written(cloud, output, options["scratch"], resume, restart)
@@ -156,8 +176,14 @@ def reconstruct(
             raise ParameterError("colors, columns: these belong to points in an array; of files, attributes= keeps them")
         else:
             options["columns"] = columns
-        line = ["reconstruct", f"--output={os.fspath(output)}", *words(options), "--", *inputs]
-        answer, made = run(line, progress, quiet)
+        if executor is None:
+            line = ["reconstruct", f"--output={os.fspath(output)}", *words(options), "--", *inputs]
+            answer, made = run(line, progress, quiet)
+        else:
+            inputs = [path if "://" in path else os.path.abspath(path) for path in inputs]
+            # What stands behind `--` is for schedulers.
+            line = [*inputs, f"--output={os.path.abspath(output)}", *plan_words(options, shards)]
+            answer, made = share(executor, line, options, progress)
         if folder is not None:
             failed.pop_all()
     return Mesh(made or output, answer, _temporary=folder)
@@ -230,6 +256,79 @@ def compare(
     del options["a"], options["b"], options["progress"]
     with _files(a, scratch) as first, _files(b, scratch) as second:
         return run(["compare", *words(options), "--", *first, *second], progress, quiet)[0]
+
+
+def change(
+    old: Any,
+    new: Union[Mesh, Path],
+    *,
+    output: Optional[Path] = None,
+    progress: Union[Progress, bool, None] = None,
+    registration: float = 0,
+    radius: Optional[float] = None,
+    farthest: Optional[float] = None,
+    areas: Optional[Path] = None,
+    html: Optional[Path] = None,
+    memory: Optional[Size] = None,
+    threads: Optional[int] = None,
+    scratch: Optional[Path] = None,
+    io: str = "auto",
+    scratch_compression: Union[int, str] = "auto",
+    quiet: bool = False,
+) -> Answer:
+    """Measures what changed from one surface, a :class:`Mesh`, a file, a folder or an array, to a new mesh."""
+    options = dict(locals())
+    del options["old"], options["new"], options["progress"]
+    with _files(old, scratch) as first:
+        return run(["change", *words(options), "--", *first, _path(new)], progress, quiet)[0]
+
+
+def volume(
+    mesh: Union[Mesh, Path],
+    *,
+    progress: Union[Progress, bool, None] = None,
+    above: Union[float, Mesh, Path, None] = None,
+    crop: Optional[Region] = None,
+    memory: Optional[Size] = None,
+    threads: Optional[int] = None,
+    scratch: Optional[Path] = None,
+    io: str = "auto",
+    scratch_compression: Union[int, str] = "auto",
+    quiet: bool = False,
+) -> Answer:
+    """Measures what a mesh encloses, or what lies above and below a level or another mesh (``above``)."""
+    options = dict(locals())
+    del options["mesh"], options["progress"]
+    if isinstance(above, Mesh):
+        options["above"] = above.path
+    return run(["volume", *words(options), "--", _path(mesh)], progress, quiet)[0]
+
+
+def raster(
+    source: Any,
+    *,
+    output: Path,
+    cell: float,
+    progress: Union[Progress, bool, None] = None,
+    surface: str = "highest",
+    crop: Optional[Region] = None,
+    orthophoto: Optional[Path] = None,
+    contours: Optional[float] = None,
+    contours_output: Optional[Path] = None,
+    memory: Optional[Size] = None,
+    threads: Optional[int] = None,
+    scratch: Optional[Path] = None,
+    io: str = "auto",
+    scratch_compression: Union[int, str] = "auto",
+    quiet: bool = False,
+    resume: bool = False,
+    restart: bool = False,
+) -> Answer:
+    """Makes a raster of heights (GeoTIFF) of a mesh or points, with contours and an orthophoto if wanted."""
+    options = dict(locals())
+    del options["source"], options["progress"]
+    with _files(source, scratch) as files:
+        return run(["raster", *words(options), "--", *files], progress, quiet)[0]
 
 
 def tiles(

@@ -6,16 +6,15 @@ import base64
 import html
 import os
 import shutil
-import weakref
 from collections.abc import Mapping
 from typing import IO, Any, Optional
 
 import numpy as np
 import numpy.typing as npt
 
-from . import _outcrop
+from . import _outcrop, _system
 from ._points import PLY
-from ._run import Error, InputError, ParameterError, Path, finished, named
+from ._run import Error, InputError, ParameterError, Path, finished, is_url, named
 
 _NUMPY = {name: kind for kind, name in PLY.items()}
 
@@ -40,18 +39,23 @@ class Mesh:
     def __init__(
         self, path: Path, report: Optional[Mapping[str, Any]] = None, *, _temporary: Optional[str] = None
     ) -> None:
-        self.path: str = os.path.abspath(path)
+        self.path: str = os.fspath(path) if is_url(path) else os.path.abspath(path)
         #: The report of the run, as ``--report`` writes it; empty for a mesh that was opened.
         self.report: dict[str, Any] = report if isinstance(report, dict) else dict(report or {})
         self._rows: Optional[tuple[Array, Array, list[str]]] = None
+        self._temporary = _temporary
         if _temporary is not None:
-            weakref.finalize(self, shutil.rmtree, _temporary, True)
+            _system.discard_after(_temporary, self, [])
         if report is None:
             self._map()
 
     def _map(self) -> tuple[Array, Array, list[str]]:
+        if self._rows is None and is_url(self.path):
+            raise InputError(f"{self.path}: a mesh in a store has no arrays here; copy it to this machine and open that")
         if self._rows is None:
             self._rows = _mapped(self.path)
+            if self._temporary is not None:
+                _system.discard_after(self._temporary, None, list(self._rows[:2]))
         return self._rows
 
     @property

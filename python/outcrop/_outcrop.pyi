@@ -1,10 +1,11 @@
 from typing import Any, Optional, final
 
-__all__ = ["Job", "__version__", "options"]
+__all__ = ["Job", "__version__", "options", "part_of"]
 
 __version__: str
 
 def options(command: str) -> list[tuple[str, bool, bool, Optional[str], bool, str]]: ...
+def part_of(file: str) -> None: ...
 @final
 class Job:
     @staticmethod

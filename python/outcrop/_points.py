@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import itertools
 import os
 import re
-import shutil
 import tempfile
 import zlib
 from collections.abc import Iterator, Mapping
@@ -16,7 +14,8 @@ from typing import IO, Any, Optional
 import numpy as np
 import numpy.typing as npt
 
-from ._run import InputError, Path, ScratchError, named
+from . import _system
+from ._run import InputError, Path, ScratchError, is_url, named
 
 Array = npt.NDArray[Any]
 
@@ -132,10 +131,11 @@ def written(cloud: Cloud, output: str, scratch: Optional[str], resume: bool, res
     """
     start = _place(output, scratch)
     place, folder = f"{start}.outcrop-points.ply", f"{start}.outcrop-scratch"
-    with _opened(place) as file:
+    with contextlib.ExitStack() as stack:
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
+            with named(place, "open"):
+                file = stack.enter_context(_system.locked(place))
+        except _system.Taken:
             why = "another run is at work here; wait for it, or choose another scratch"
             raise ScratchError(f"{place}: {why}") from None
         try:
@@ -147,26 +147,26 @@ def written(cloud: Cloud, output: str, scratch: Optional[str], resume: bool, res
                 raise ScratchError(f"{folder}: {why}")
             elif not cloud.is_in(file):
                 raise ScratchError(f"{folder}: cannot go on: the points were other ones; restart=True begins again")
+            _system.settle(file)
             yield place
         finally:
             if not os.path.isdir(folder):
+                _system.settle(file)
                 with contextlib.suppress(FileNotFoundError):
                     os.unlink(place)
-
-
-def _opened(place: str) -> IO[bytes]:
-    with named(place, "open"):
-        return os.fdopen(os.open(place, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600), "r+b")
 
 
 def temporary_folder(scratch: Optional[Path]) -> str:
     """A new folder in that of the scratch files, or where the system has temporary files."""
     with named(scratch or tempfile.gettempdir(), "make a folder"):
-        return os.path.abspath(tempfile.mkdtemp(prefix="outcrop-", dir=scratch))
+        return _system.temporary_folder(None if scratch is None else os.fsdecode(scratch))
 
 
 def _place(output: str, scratch: Optional[str]) -> str:
     """The path of the scratch folder of the run with this output, without its ending."""
+    if is_url(output):
+        names = [name for name in output.rstrip("/").split("/") if name != "tileset.json"]
+        return os.path.abspath(os.path.join(scratch or "", f"{names[-1]}-{zlib.crc32(os.fsencode(output)):08x}"))
     if os.path.basename(output) == "tileset.json":
         output = os.path.dirname(output)
     folder, name = os.path.split(output)
@@ -187,4 +187,4 @@ def temporary(points: Any, scratch: Optional[Path]) -> Iterator[str]:
             cloud.write(file)
         yield place
     finally:
-        shutil.rmtree(folder, ignore_errors=True)
+        _system.discard(folder)

@@ -15,16 +15,21 @@ from typing import Any, Callable, Optional, Union
 
 import numpy as np
 
-from . import _outcrop
+from . import _outcrop, _system
 
 Path = Union[str, "os.PathLike[str]"]
 Progress = Callable[[str, int, int], object]
 
 # Seconds between two looks at signals and at the progress.
-_LOOK = 0.1
+LOOK = 0.1
 
 # Seconds that a run has to stop by itself. Its finished work is on disk, so nothing needs to wait for it after that.
 _PATIENCE = 0.8
+
+
+def is_url(path: Path) -> bool:
+    """True for a file behind a URL."""
+    return "://" in os.fspath(path)
 
 
 class Error(Exception):
@@ -141,13 +146,24 @@ def run(
     words: list[str], progress: Union[Progress, bool, None] = None, quiet: bool = False
 ) -> tuple[Answer, Optional[str]]:
     """Runs a command; returns its result and the path of what was made."""
+    with announced(progress, quiet) as told:
+        return result(words, told)
+
+
+@contextlib.contextmanager
+def announced(progress: Union[Progress, bool, None], quiet: bool) -> Iterator[Optional[Progress]]:
+    """Who is told of the progress: a function, bars, or nobody."""
     shown = _Bars() if progress is True or (progress is None and not quiet and _in_notebook()) else progress
     try:
-        job = finished(_outcrop.Job.command(words), shown if callable(shown) else None)
+        yield shown if callable(shown) else None
     finally:
         if isinstance(shown, _Bars):
             shown.close()
-    answer = job.answer()
+
+
+def result(words: list[str], told: Optional[Progress] = None) -> tuple[Answer, Optional[str]]:
+    """The result of a command, and the path of what was made."""
+    answer = finished(_outcrop.Job.command(words), told).answer()
     assert answer is not None
     values, text, made = answer
     return Answer(json.loads(values), text), None if made is None else os.fspath(made)
@@ -158,7 +174,7 @@ def finished(job: _outcrop.Job, told: Optional[Progress] = None) -> _outcrop.Job
     try:
         ended = False
         while not ended:
-            ended = job.wait(_LOOK)
+            ended = job.wait(LOOK)
             for message in job.warnings():
                 warnings.warn(message, OutcropWarning, stacklevel=4)
             if told is not None:
@@ -178,7 +194,7 @@ def _error(kind: str, message: str, can_resume: bool, number: Optional[int]) -> 
     error = _ERRORS.get(kind, Error)(message)
     error.can_resume = can_resume
     if isinstance(error, OSError):
-        error.errno = number
+        error.errno = _system.number_of(number)
     return error
 
 

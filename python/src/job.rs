@@ -63,6 +63,7 @@ impl Job {
             let answer = call::run(words, shared.progress.clone(), shared.cancel.clone())?;
             let output = match &answer {
                 call::Answer::Mesh { output, .. } => Some(output.clone()),
+                call::Answer::Advance(opened) => opened.output.clone(),
                 _ => None,
             };
             Ok(Outcome::Answer((

@@ -14,7 +14,7 @@ mod _outcrop {
     #[pymodule_export]
     use super::job::Job;
     #[pymodule_export]
-    use super::options;
+    use super::{options, part_of};
     use pyo3::prelude::*;
 
     #[pymodule_init]
@@ -33,4 +33,10 @@ fn options(command: &str) -> Vec<OptionRow> {
     let all = outcrop::call::options(command).into_iter();
     all.map(|o| (o.name, o.is_flag, o.repeats, o.default, o.is_hidden, o.help))
         .collect()
+}
+
+/// Names the file of this extension: all processes that share a run must have the very same.
+#[pyfunction]
+fn part_of(file: std::path::PathBuf) {
+    outcrop::call::part_of(file);
 }

@@ -11,10 +11,10 @@ import pytest
 import outcrop
 from outcrop import _outcrop, _run
 
-COMMANDS = ["reconstruct", "info", "verify", "compare", "simplify", "close", "tiles"]
+COMMANDS = ["reconstruct", "info", "verify", "compare", "change", "volume", "raster", "simplify", "close", "tiles"]
 
-# Keywords that are no options: arrays, and the display of the progress.
-OURS = {"colors", "progress"}
+# Keywords that are no options of these commands: arrays, the display of the progress, and who does the work.
+OURS = {"colors", "progress", "executor", "shards"}
 
 # Options that are no keywords: results are not printed but returned.
 PRINTED = {"json"}

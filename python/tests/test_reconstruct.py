@@ -189,6 +189,16 @@ def test_other_commands(points: Points, tmp_path: Path, program: Any) -> None:
     distance = outcrop.compare(mesh, points, samples=1000, memory=MEMORY)
     again = outcrop.compare(mesh.path, points, samples=1e3, memory=MEMORY)
     assert distance["a_to_b"] == again["a_to_b"]
+    found = outcrop.volume(mesh, memory=MEMORY)
+    assert str(found) == program("volume", mesh.path).stdout.rstrip("\n")
+    assert found["body"]["volume"] == pytest.approx(verdict["volume"], rel=1e-12)
+    above = outcrop.volume(mesh, above=0.5, crop=[-2, -2, 2, 2], memory=MEMORY)["earth"]
+    assert above["above"] > 0 > above["below"] and above["is_closed"]
+    assert outcrop.volume(mesh, above=mesh, memory=MEMORY)["earth"]["net"] == pytest.approx(0, abs=1e-9)
+    heights = outcrop.raster(mesh, output=tmp_path / "dem.tif", cell=0.1, contours=0.25, memory=MEMORY)
+    assert heights["cells"] > 0 and (tmp_path / "dem.tif").stat().st_size == heights["bytes"]
+    assert heights["contours"]["path"] == str(tmp_path / "dem-contours.geojson")
+    assert outcrop.raster(points, output=tmp_path / "points.tif", cell=0.1, memory=MEMORY)["source"]["points"] == 5000
     made = outcrop.tiles(mesh, output=tmp_path / "levels", memory=MEMORY)
     assert made["triangles"] == verdict["triangles"] and (tmp_path / "levels" / "tileset.json").exists()
 

@@ -1,6 +1,7 @@
 //! Command-line arguments.
 
 mod job;
+mod survey;
 
 use super::parse::{count, samples, size, system, time};
 use crate::params::Close as Closed;
@@ -12,6 +13,7 @@ use outcrop_disk::workspace::{Compression, Storage};
 use outcrop_points::GivenCrs;
 use std::path::PathBuf;
 use std::time::Duration;
+pub use survey::{Change, Raster, Volume};
 
 /// Resources of a run.
 #[derive(Debug, ClapArgs)]
@@ -197,7 +199,7 @@ pub struct Tiles {
     /// The mesh (PLY, OBJ, STL or GLB, also as .zst)
     #[arg(value_name = "MESH")]
     pub mesh: PathBuf,
-    /// The folder to write: tileset.json and tiles
+    /// The folder to write, or the URL of one in a store: tileset.json and tiles
     #[arg(long, short, value_name = "DIR")]
     pub output: PathBuf,
     /// Place the tiles on the globe, by the reference system in the header of the mesh, or else in MESH.prj
@@ -227,7 +229,7 @@ pub struct Simplify {
     /// The mesh (PLY, OBJ, STL or GLB, also as .zst)
     #[arg(value_name = "MESH")]
     pub mesh: PathBuf,
-    /// The mesh to write: .ply, .obj, .stl or .glb
+    /// The mesh to write: .ply, .obj, .stl or .glb; also the URL of one in a store
     #[arg(long, short, value_name = "OUT")]
     pub output: PathBuf,
     #[command(flatten)]
@@ -260,7 +262,7 @@ pub struct Close {
     /// The mesh (PLY, OBJ, STL or GLB, also as .zst)
     #[arg(value_name = "MESH")]
     pub mesh: PathBuf,
-    /// The mesh to write: .ply, .obj, .stl or .glb
+    /// The mesh to write: .ply, .obj, .stl or .glb; also the URL of one in a store
     #[arg(long, short, value_name = "OUT")]
     pub output: PathBuf,
     /// How: auto (smooth where the surface runs on into the hole, else a lid), lids, smooth, or base (walls from outer

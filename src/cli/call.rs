@@ -23,15 +23,23 @@
 //! ```
 
 use super::command::{Args, Command};
+use super::shared::After;
+use super::shared::jobs::{self as tasks, Step};
 use super::{jobs, output};
 use crate::info::{Headers, Info};
+pub use crate::pipeline::part_of;
+use crate::pipeline::{Status, Worked};
 use crate::report::{CloseReport, Report, SimplifyReport, TilesReport};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{ArgAction, CommandFactory, Parser};
 use outcrop_disk::error::{Error, Result, Setting};
 use outcrop_disk::workspace::progress::{Cancel, Observer};
+use outcrop_inspect::change::Change;
 use outcrop_inspect::compare::Comparison;
 use outcrop_inspect::verify::Verdict;
+use outcrop_survey::{raster::Raster, volume::Volumes};
+use serde::Serialize;
+use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -55,12 +63,98 @@ pub enum Answer {
     Verdict(Box<Verdict>),
     /// Of `compare`.
     Comparison(Box<Comparison>),
+    /// Of `change`.
+    Change(Box<Change>),
+    /// Of `volume`.
+    Volumes(Box<Volumes>),
+    /// Of `raster`.
+    Raster(Box<Raster>),
     /// Of `tiles`.
     Tiles(Box<TilesReport>),
     /// Of `simplify`.
     Simplify(Box<SimplifyReport>),
     /// Of `close`.
     Close(Box<CloseReport>),
+    /// Of `plan`: the folder of the run.
+    Plan(PathBuf),
+    /// Of `status`.
+    Status(Box<Status>),
+    /// Of `work`.
+    Work(Part),
+    /// Of `advance`.
+    Advance(Box<Opened>),
+}
+
+/// How the work of a task ended, or the work between two generations.
+#[derive(Debug, Clone, Serialize)]
+#[non_exhaustive]
+pub struct Part {
+    /// It is done, or nothing is left of it to do.
+    pub done: bool,
+    /// Why it is not done and is to be tried again later.
+    pub why: Option<String>,
+}
+
+/// How the work between two generations ended.
+#[derive(Debug, Serialize)]
+#[non_exhaustive]
+pub struct Opened {
+    /// Whether it is done.
+    #[serde(flatten)]
+    pub part: Part,
+    /// True if the mesh is finished.
+    pub finished: bool,
+    /// Counts and measurements of the run, if this process finished it.
+    pub report: Option<Box<Report>>,
+    /// Path of the mesh, if it is finished.
+    pub output: Option<PathBuf>,
+    #[serde(skip)]
+    after: Option<After>,
+}
+
+impl Part {
+    fn of(why: Option<String>) -> Self {
+        let done = why.is_none();
+        Self { done, why }
+    }
+
+    fn text(&self) -> String {
+        self.why.clone().unwrap_or_else(|| "done".into())
+    }
+}
+
+impl Opened {
+    fn of(step: Step) -> Self {
+        let why = match step {
+            Step::Done(done) => {
+                let finished = done.after.finished;
+                return Self {
+                    part: Part::of(None),
+                    finished,
+                    report: done.report,
+                    output: finished.then_some(done.output),
+                    after: Some(done.after),
+                };
+            }
+            Step::Missing(what) => what,
+            Step::Damaged(error) => error.to_string(),
+        };
+        Self {
+            part: Part::of(Some(why)),
+            finished: false,
+            report: None,
+            output: None,
+            after: None,
+        }
+    }
+
+    fn text(&self) -> String {
+        match (&self.report, &self.output, &self.after) {
+            (Some(report), Some(output), _) => output::summary(report, output),
+            (_, _, Some(after)) => after.to_string(),
+            _ => self.part.text(),
+        }
+    }
 }
 
 impl Answer {
@@ -75,9 +169,16 @@ impl Answer {
             Self::Headers(headers) => output::json(headers),
             Self::Verdict(verdict) => output::json(verdict),
             Self::Comparison(comparison) => output::json(comparison),
+            Self::Change(change) => output::json(change),
+            Self::Volumes(volumes) => output::json(volumes),
+            Self::Raster(raster) => output::json(raster),
             Self::Tiles(report) => output::json(report),
             Self::Simplify(report) => output::json(report),
             Self::Close(report) => output::json(report),
+            Self::Plan(folder) => output::json(&BTreeMap::from([("folder", folder)])),
+            Self::Status(status) => output::json(status),
+            Self::Work(part) => output::json(part),
+            Self::Advance(opened) => output::json(opened),
         }
     }
 
@@ -96,9 +197,16 @@ impl Answer {
             Self::Headers(headers) => headers.to_string(),
             Self::Verdict(verdict) => verdict.to_string(),
             Self::Comparison(comparison) => comparison.to_string(),
+            Self::Change(change) => change.to_string(),
+            Self::Volumes(volumes) => volumes.to_string(),
+            Self::Raster(raster) => raster.to_string(),
             Self::Tiles(report) => report.told(spell),
             Self::Simplify(report) => report.to_string(),
             Self::Close(report) => report.to_string(),
+            Self::Plan(folder) => folder.display().to_string(),
+            Self::Status(status) => status.to_string(),
+            Self::Work(part) => part.text(),
+            Self::Advance(opened) => opened.text(),
         }
     }
 }
@@ -144,8 +252,8 @@ impl CallError {
     }
 }
 
-/// Runs `reconstruct`, `resume`, `info`, `verify`, `compare`, `simplify`, `close` or `tiles`; `words` are those behind the
-/// name of the program.
+/// Runs `reconstruct`, `resume`, `info`, `verify`, `compare`, `change`, `volume`, `raster`, `simplify`, `close` or `tiles`, and
+/// `plan`, `status`, `work` and `advance` of runs that tasks share; `words` are those behind the name of the program.
 ///
 /// # Errors
 /// [`CallError`]. After one that [can be resumed](Error::can_resume) the scratch folder stays.
@@ -171,9 +279,22 @@ pub fn run<W: Into<OsString>>(
         },
         Command::Verify(args) => Answer::Verdict(Box::new(jobs::verify(&args, watch)?)),
         Command::Compare(args) => Answer::Comparison(Box::new(jobs::compare(&args, watch)?)),
+        Command::Change(args) => Answer::Change(Box::new(jobs::change(&args, watch)?)),
+        Command::Volume(args) => Answer::Volumes(Box::new(jobs::volume(&args, watch)?)),
+        Command::Raster(args) => Answer::Raster(Box::new(jobs::raster(&args, watch)?)),
         Command::Simplify(args) => Answer::Simplify(Box::new(jobs::simplify(&args, watch)?)),
         Command::Close(args) => Answer::Close(Box::new(jobs::close(&args, watch)?)),
         Command::Tiles(args) => Answer::Tiles(Box::new(jobs::tiles(&args, watch)?)),
+        Command::Plan(args) if args.submit.is_none() => Answer::Plan(tasks::plan(&args)?),
+        Command::Status(args) => Answer::Status(Box::new(tasks::status(&args.folder)?)),
+        Command::Work(args) => Answer::Work(match tasks::work(&args, watch, |_| ())? {
+            Worked::Done | Worked::Superseded => Part::of(None),
+            Worked::TooEarly => Part::of(Some("its generation has not begun".into())),
+            Worked::Damaged(error) => Part::of(Some(error.to_string())),
+        }),
+        Command::Advance(args) => {
+            Answer::Advance(Box::new(Opened::of(tasks::advance(&args, watch, |_| ())?)))
+        }
         _ => {
             let why = "this command is for the command line only";
             return Err(CallError::Usage {

@@ -1,6 +1,9 @@
 //! The commands and their help.
 
-use super::args::{Close, Compare, Demo, Info, Reconstruct, Resume, Simplify, Tiles, Verify, View};
+use super::args::{
+    Change, Close, Compare, Demo, Info, Raster, Reconstruct, Resume, Simplify, Tiles, Verify, View,
+    Volume,
+};
 use super::shared::{Advance, Plan, Status, Submit, Work};
 use crate::features;
 use clap::{Parser, Subcommand};
@@ -43,6 +46,9 @@ pub const EXAMPLES: &str = "  outcrop reconstruct scan.laz -o mesh.ply
   outcrop info scan.laz
   outcrop verify mesh.ply && echo manifold
   outcrop compare mesh.ply scan.laz --html distances.html
+  outcrop change may.ply june.ply -o map.ply --registration 0.02
+  outcrop volume pit.ply --above 412.5 --crop claim.geojson
+  outcrop raster mesh.ply -o dem.tif --cell 0.5 --contours 1
   outcrop simplify mesh.ply -o small.ply --triangles 2e6
   outcrop close mesh.ply -o print.stl
   outcrop tiles mesh.ply -o town
@@ -79,6 +85,12 @@ pub enum Command {
     Tiles(Tiles),
     /// Measure the distance between two meshes or clouds
     Compare(Compare),
+    /// Measure what changed from one surface to another, and whether more than noise
+    Change(Change),
+    /// Measure volumes: what a mesh encloses, or what lies above and below a level or another mesh
+    Volume(Volume),
+    /// Make a raster of heights, with contours and colours if you like
+    Raster(Raster),
     /// Show a mesh of any size in the browser
     View(View),
     /// Generate a cloud, reconstruct it and verify the mesh

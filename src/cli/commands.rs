@@ -1,6 +1,9 @@
 //! The commands of the program: their work, and what they print.
 
-use super::args::{Close, Compare, Info, Quiet, Reconstruct, Resume, Simplify, Tiles, Verify};
+use super::args::{
+    Change, Close, Compare, Info, Quiet, Raster, Reconstruct, Resume, Simplify, Tiles, Verify,
+    Volume,
+};
 use super::command::Command;
 #[cfg(feature = "demo")]
 use super::demo;
@@ -23,6 +26,9 @@ pub fn run(command: Command) -> Result<Ended> {
         Command::Info(args) => info(&args),
         Command::Verify(args) => check(&args),
         Command::Compare(args) => measure(&args),
+        Command::Change(args) => changes(&args),
+        Command::Volume(args) => volume(&args),
+        Command::Raster(args) => raster(&args),
         Command::Simplify(args) => simplify(&args),
         Command::Close(args) => close(&args),
         Command::Tiles(args) => tiles(&args),
@@ -83,6 +89,24 @@ fn check(args: &Verify) -> Result<bool> {
 fn measure(args: &Compare) -> Result<bool> {
     let comparison = jobs::compare(args, stop::watched(args.limits.quiet))?;
     show(&comparison, args.json)?;
+    Ok(true)
+}
+
+fn changes(args: &Change) -> Result<bool> {
+    let change = jobs::change(args, stop::watched(args.limits.quiet))?;
+    show(&change, args.json)?;
+    Ok(true)
+}
+
+fn volume(args: &Volume) -> Result<bool> {
+    let volumes = jobs::volume(args, stop::watched(args.limits.quiet))?;
+    show(&volumes, args.json)?;
+    Ok(true)
+}
+
+fn raster(args: &Raster) -> Result<bool> {
+    let raster = jobs::raster(args, stop::watched(args.limits.quiet))?;
+    show(&raster, args.json)?;
     Ok(true)
 }
 

@@ -1,15 +1,18 @@
 //! The work of the commands: from arguments to results, without a word on the screen.
 
 use super::args::{
-    Close, Compare, Ends, Info, Limits, Reconstruct, Resume, Simplify, Tiles as TilesArgs, Verify,
+    Change, Close, Compare, Ends, Info, Limits, Raster, Reconstruct, Resume, Simplify,
+    Tiles as TilesArgs, Verify, Volume,
 };
 use super::output::{NewFile, is_page, report_text};
-use super::pages;
+use super::{areas, pages};
 #[cfg(not(feature = "levels"))]
 use crate::features::LEVELS;
 use crate::info;
 use crate::params::Params;
-use crate::pipeline::{Builder, Reconstruction, default_memory, default_threads};
+use crate::pipeline::{
+    self, Builder, Rasterization, Reconstruction, default_memory, default_threads,
+};
 #[cfg(feature = "levels")]
 use crate::pipeline::{Closing, Simplification, Tiles};
 use crate::report::{CloseReport, Report, SimplifyReport, TilesReport};
@@ -17,9 +20,11 @@ use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::memory::MemoryPool;
 use outcrop_disk::workspace::progress::{Cancel, Observer};
-use outcrop_inspect::{compare, verify};
+use outcrop_inspect::{change, compare, verify};
 use outcrop_points::is_remote;
-use std::path::PathBuf;
+use outcrop_survey::raster;
+use outcrop_survey::volume::{self, Volumes};
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// The receiver of the progress, and the flag that stops the work.
@@ -111,14 +116,16 @@ fn run(
     Ok((report, run.output().to_path_buf()))
 }
 
-/// The headers of a cloud, if no more is wanted: of files behind URLs nothing else is read, unless that is asked for.
+/// The headers of a cloud and what a run would read of it, if no more is wanted: of files behind URLs nothing else is
+/// read, unless that is asked for.
 pub fn headers(args: &Info) -> Result<Option<info::Headers>> {
     let remote = args.inputs.iter().any(|input| is_remote(input));
     if !args.headers && (!remote || args.all_points || args.html.is_some()) {
         return Ok(None);
     }
-    let layout = args.points.params().selection().layout;
-    info::headers(&args.inputs, &layout).map(Some)
+    let memory = MemoryPool::new(memory(&args.limits))?;
+    let selection = args.points.params().selection();
+    info::headers(&args.inputs, &selection, &memory, &Cancel::new()).map(Some)
 }
 
 /// Describes a cloud.
@@ -135,8 +142,21 @@ pub fn info(args: &Info, watch: Watch) -> Result<info::Info> {
     pages::info(page, &args.inputs, &params, &workspace)
 }
 
+/// Refuses a mesh behind a URL.
+pub fn local(mesh: &Path) -> Result<()> {
+    match is_remote(mesh) {
+        true => Err(Error::Parameter {
+            name: "MESH",
+            found: "a URL".into(),
+            expected: "a path: clouds are read from servers, meshes from this machine".into(),
+        }),
+        false => Ok(()),
+    }
+}
+
 /// Checks a mesh.
 pub fn verify(args: &Verify, watch: Watch) -> Result<verify::Verdict> {
+    local(&args.mesh)?;
     let workspace = workspace(&args.limits, watch)?;
     let options = verify::Options {
         allow_unreferenced: args.allow_unreferenced,
@@ -162,8 +182,39 @@ pub fn compare(args: &Compare, watch: Watch) -> Result<compare::Comparison> {
     pages::compare(page, [a, b], &options, &workspace)
 }
 
-/// Runs a job on a mesh within the limits of the command line.
-#[cfg(feature = "levels")]
+/// Measures what changed from one surface to another.
+pub fn change(args: &Change, watch: Watch) -> Result<change::Change> {
+    local(&args.new)?;
+    let workspace = workspace(&args.limits, watch)?;
+    let options = change::Options {
+        radius: args.radius,
+        farthest: args.farthest,
+        registration: args.registration,
+    };
+    let areas = args.areas.as_deref().map(areas::File::new).transpose()?;
+    let output = args.output.as_deref();
+    let surfaces = [args.old.as_path(), &args.new];
+    let found = match &args.html {
+        None => pipeline::change(surfaces, output, &options, &workspace)?,
+        Some(path) => {
+            let page = NewFile::page(path)?;
+            pages::change(page, surfaces, output, &options, &workspace)?
+        }
+    };
+    if let Some(areas) = areas {
+        areas.write(&found)?;
+    }
+    Ok(found)
+}
+
+/// Measures volumes.
+pub fn volume(args: &Volume, watch: Watch) -> Result<Volumes> {
+    local(&args.mesh)?;
+    let workspace = workspace(&args.limits, watch)?;
+    volume::volume(&args.mesh, &args.options(), &workspace)
+}
+
+/// Runs a job on a mesh or a cloud within the limits of the command line.
 macro_rules! run_within {
     ($job:ident, $args:ident, $observer:ident, $cancel:ident) => {{
         let job = $job
@@ -180,10 +231,17 @@ macro_rules! run_within {
     }};
 }
 
+/// Makes a raster of heights.
+pub fn raster(args: &Raster, (observer, cancel): Watch) -> Result<raster::Raster> {
+    let job = Rasterization::new(&args.source, args.options());
+    run_within!(job, args, observer, cancel)
+}
+
 /// Makes a mesh with fewer triangles.
 #[cfg(feature = "levels")]
 pub fn simplify(args: &Simplify, (observer, cancel): Watch) -> Result<SimplifyReport> {
     use outcrop_levels::single::{Goal, Options};
+    local(&args.mesh)?;
     let goal = &args.goal;
     let goal = match (goal.triangles, goal.ratio, goal.error) {
         (Some(number), ..) => Goal::Triangles(number),
@@ -212,6 +270,7 @@ pub fn simplify(_: &Simplify, _: Watch) -> Result<SimplifyReport> {
 /// Closes a mesh.
 #[cfg(feature = "levels")]
 pub fn close(args: &Close, (observer, cancel): Watch) -> Result<CloseReport> {
+    local(&args.mesh)?;
     let job = Closing::new(&args.mesh, &args.output).kind(args.kind);
     run_within!(job, args, observer, cancel)
 }
@@ -225,6 +284,7 @@ pub fn close(_: &Close, _: Watch) -> Result<CloseReport> {
 /// Makes levels of detail.
 #[cfg(feature = "levels")]
 pub fn tiles(args: &TilesArgs, (observer, cancel): Watch) -> Result<TilesReport> {
+    local(&args.mesh)?;
     let options = outcrop_levels::Options {
         geo: args.geo,
         crs: args.crs.clone(),

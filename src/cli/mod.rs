@@ -1,5 +1,6 @@
 //! The command line: arguments, messages, exit codes. The only code that prints.
 
+mod areas;
 mod args;
 pub mod call;
 mod command;
@@ -55,7 +56,7 @@ pub fn main() -> ExitCode {
         return ExitCode::from(FAILED);
     }
     outcrop_points::hide_caught_panics();
-    let args = command::Args::parse();
+    let args = command::Args::parse_from(outcrop_platform::names::arguments());
     match commands::run(args.command) {
         Ok(Ended::Yes) => ExitCode::SUCCESS,
         Ok(Ended::No) => ExitCode::from(NO),

@@ -1,10 +1,12 @@
 //! Output of the commands: text, JSON, reports.
 
 use super::{pages, style};
+use crate::deliver::{check_text, put_text};
 use crate::features::PAGES;
 use crate::params::Smooth;
 use crate::report::Report;
 use outcrop_disk::error::{Error, Result, Setting};
+use outcrop_points::is_remote;
 use serde::Serialize;
 use std::fmt::Display;
 use std::io::Write;
@@ -75,6 +77,9 @@ pub fn report_text(path: &Path, report: &Report, mesh: &Path) -> Result<String> 
 /// Writes the report of a run.
 pub fn write_report(path: &Path, report: &Report, mesh: &Path) -> Result<()> {
     let text = report_text(path, report, mesh)?;
+    if is_remote(path) {
+        return put_text(path, &text);
+    }
     std::fs::write(path, text).map_err(|e| Error::io(path, "write the report", e))
 }
 
@@ -105,6 +110,13 @@ impl<'a> NewFile<'a> {
     }
 
     fn opened(path: &'a Path) -> Result<Self> {
+        if is_remote(path) {
+            check_text(path)?;
+            return Ok(Self {
+                path,
+                is_new: false,
+            });
+        }
         let is_new = !path.exists();
         let opened = std::fs::File::options()
             .append(true)
@@ -122,6 +134,9 @@ impl<'a> NewFile<'a> {
     /// Writes it.
     pub fn write(mut self, text: &str) -> Result<()> {
         self.is_new = false;
+        if is_remote(self.path) {
+            return put_text(self.path, text);
+        }
         std::fs::write(self.path, text).map_err(|e| Error::io(self.path, "write the report", e))
     }
 }

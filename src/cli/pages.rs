@@ -1,19 +1,19 @@
 //! The pages of the commands; a build without pages refuses them before the work.
 
 #[cfg(not(feature = "pages"))]
-pub use absent::{compare, info, report, verify};
+pub use absent::{change, compare, info, report, verify};
 #[cfg(feature = "pages")]
-pub use made::{compare, info, report, verify};
+pub use made::{change, compare, info, report, verify};
 
 #[cfg(feature = "pages")]
 mod made {
     use super::super::output::NewFile;
     use crate::params::Params;
     use crate::report::Report;
-    use crate::{info, page};
+    use crate::{info, page, pipeline};
     use outcrop_disk::error::Result;
     use outcrop_disk::workspace::Workspace;
-    use outcrop_inspect::{compare, verify};
+    use outcrop_inspect::{change, compare, verify};
     use std::path::{Path, PathBuf};
 
     /// The report of a run.
@@ -56,6 +56,19 @@ mod made {
         file.write(&page::comparison(&comparison, &drawn))?;
         Ok(comparison)
     }
+
+    /// Measures what changed from one surface to another.
+    pub fn change(
+        file: NewFile<'_>,
+        surfaces: [&Path; 2],
+        output: Option<&Path>,
+        options: &change::Options,
+        workspace: &Workspace,
+    ) -> Result<change::Change> {
+        let (found, drawn) = pipeline::illustrated_change(surfaces, output, options, workspace)?;
+        file.write(&page::change(&found, &drawn))?;
+        Ok(found)
+    }
 }
 
 #[cfg(not(feature = "pages"))]
@@ -67,6 +80,7 @@ mod absent {
     use crate::report::Report;
     use outcrop_disk::error::Result;
     use outcrop_disk::workspace::Workspace;
+    use outcrop_inspect::change::{self, Change};
     use outcrop_inspect::compare::{self, Comparison};
     use outcrop_inspect::verify::{self, Verdict};
     use std::path::{Path, PathBuf};
@@ -89,6 +103,16 @@ mod absent {
         _: &compare::Options,
         _: &Workspace,
     ) -> Result<Comparison> {
+        Err(PAGES.missing())
+    }
+
+    pub fn change(
+        _: NewFile<'_>,
+        _: [&Path; 2],
+        _: Option<&Path>,
+        _: &change::Options,
+        _: &Workspace,
+    ) -> Result<Change> {
         Err(PAGES.missing())
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::params::{NoRegion, Region};
 use outcrop_points::GivenCrs;
+use outcrop_survey::volume::Above;
 use std::io::Read;
 use std::time::Duration;
 
@@ -11,6 +12,16 @@ pub fn size(text: &str) -> Result<u64, String> {
         .parse()
         .map_err(|_| format!("{text:?} is not a size like 512MiB, 4GiB or 2000000000"))?;
     Ok(size.as_u64())
+}
+
+/// From where on heights are measured: a number, or the name of a file.
+pub fn above(text: &str) -> Result<Above, String> {
+    match text.trim().parse::<f64>() {
+        Ok(level) if level.is_finite() => Ok(Above::Level(level)),
+        Ok(_) => Err(format!("{text:?} is not a level like 412.5")),
+        Err(_) if std::path::Path::new(text).is_file() => Ok(Above::Mesh(text.into())),
+        Err(_) => Err("neither a number nor a file that can be read".to_owned()),
+    }
 }
 
 /// A region: numbers, or the name of a file.

@@ -1,5 +1,6 @@
 //! The commands for runs that tasks share: plan, work, advance, status, submit.
 
+pub mod jobs;
 mod shard;
 mod status;
 mod submit;
@@ -7,14 +8,15 @@ mod submit;
 pub use status::status;
 pub use submit::submit;
 
-use super::args::{Job, Quiet, Storing};
+use super::args::{Again, Job, Quiet, Storing};
 use super::ended::Ended;
-use super::output::{is_page, json, print, summary, write_report};
+use super::output::{json, print, summary};
 use super::parse::size;
 use super::{stop, style};
-use crate::pipeline::{self, Advanced, Reconstruction, Totals, Worked};
+use crate::pipeline::{Totals, Worked};
 use clap::{Args as ClapArgs, ValueEnum};
-use outcrop_disk::error::{Error, Result};
+use jobs::Step;
+use outcrop_disk::error::Result;
 use serde::{Deserialize, Serialize};
 use std::fmt::{Display, Formatter};
 use std::path::PathBuf;
@@ -25,8 +27,8 @@ use std::path::PathBuf;
 pub struct Plan {
     #[command(flatten)]
     pub job: Job,
-    /// Folder in which the folder of the run is made; all tasks must see it under the same path
-    /// [default: beside the output]
+    /// Folder in which the folder of the run is made, which all tasks must see under the same path, or a URL such as
+    /// s3://bucket/runs [default: beside the output]
     #[arg(long, value_name = "DIR")]
     pub scratch: Option<PathBuf>,
     /// Number of parts into which each step is divided, at most 1000; several for each task that can run at
@@ -42,6 +44,8 @@ pub struct Plan {
     /// Submit the tasks at once, as `outcrop submit` does; SITE FLAGS are for it
     #[arg(long, value_name = "ENGINE", value_enum)]
     pub submit: Option<Engine>,
+    #[command(flatten)]
+    pub again: Again,
     #[command(flatten)]
     pub how: How,
 }
@@ -69,6 +73,9 @@ pub struct Work {
     /// A file with the number of a shard in each line; the index selects the line
     #[arg(long, value_name = "FILE")]
     pub shards_file: Option<PathBuf>,
+    /// Numbers of shards, such as 3,7,12-15; the index selects one
+    #[arg(long, value_name = "LIST", conflicts_with = "shards_file")]
+    pub shards: Option<String>,
     #[command(flatten)]
     pub process: Process,
 }
@@ -87,6 +94,12 @@ pub struct Process {
     /// Worker threads, at most as many as planned [default: as planned]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub threads: Option<u16>,
+    /// Of a run in a store: folder for copies of scratch files [default: that of temporary files]
+    #[arg(long, value_name = "DIR")]
+    pub copies: Option<PathBuf>,
+    /// Most bytes of these copies [default: 4GiB]
+    #[arg(long, value_name = "SIZE", value_parser = size)]
+    pub copies_limit: Option<u64>,
     #[command(flatten)]
     pub storing: Storing,
     #[command(flatten)]
@@ -181,94 +194,6 @@ pub enum Engine {
     Slurm,
 }
 
-/// Plans a run.
-pub fn plan(args: &Plan) -> Result<bool> {
-    let mut builder = args
-        .job
-        .builder()
-        .threads(args.task_threads.into())
-        .memory(args.task_memory);
-    if let Some(scratch) = &args.scratch {
-        builder = builder.scratch(scratch);
-    }
-    let run = builder.build()?;
-    let unused = [
-        ("--workers", args.how.workers.is_some()),
-        ("--foreground", args.how.foreground),
-        ("--within-allocation", args.how.within_allocation),
-        ("--report", args.how.report.is_some()),
-        ("SITE FLAGS", !args.how.site.is_empty()),
-    ];
-    if let (None, Some((name, _))) = (args.submit, unused.iter().find(|(_, given)| *given)) {
-        return Err(Error::Parameter {
-            name,
-            found: "a plan that is not submitted".into(),
-            expected: "--submit with it".into(),
-        });
-    }
-    let folder = run.plan(args.shards)?.to_path_buf();
-    if let Some(engine) = args.submit {
-        print(&format!("planned in {}", folder.display()))?;
-        return submit(&Submit {
-            folder,
-            engine,
-            dry_run: false,
-            inside: false,
-            how: args.how.clone(),
-        });
-    }
-    print(&format!(
-        "planned in {}; go on with: outcrop submit {}",
-        folder.display(),
-        stop::quoted(&folder)
-    ))?;
-    Ok(true)
-}
-
-fn opened(folder: &std::path::Path, process: &Process, pictures: bool) -> Result<Reconstruction> {
-    let (observer, cancel) = stop::watched(process.quiet);
-    let mut builder = Reconstruction::shared(folder)?
-        .observer(observer)
-        .cancel(cancel)
-        .pictures(pictures)
-        .storage(process.storing.storage());
-    if let Some(memory) = process.memory {
-        builder = builder.memory(memory);
-    }
-    if let Some(threads) = process.threads {
-        builder = builder.threads(threads.into());
-    }
-    let run = builder.build()?;
-    stop::can_end(&run);
-    Ok(run)
-}
-
-/// Does the units of a shard.
-pub fn work(args: &Work) -> Result<Ended> {
-    let shard = shard::chosen(args)?;
-    let folder = pipeline::shared_folder(&args.folder)?;
-    if let Some(count) = shard.count {
-        let planned = pipeline::planned_shards(&folder)?;
-        if planned != count {
-            return Err(Error::Parameter {
-                name: "shard",
-                found: format!("a shard of {count}"),
-                expected: format!("one of the {planned} that were planned"),
-            });
-        }
-    }
-    let run = opened(&folder, &args.process, false)?;
-    Ok(match run.work(args.generation, shard.number)? {
-        Worked::Done | Worked::Superseded => Ended::Yes,
-        Worked::TooEarly => Ended::TooEarly(format!(
-            "{}: generation {} has not begun",
-            folder.display(),
-            args.generation.unwrap_or_default()
-        )),
-        Worked::Damaged(error) => Ended::Damaged(error),
-    })
-}
-
 /// The state after the work between two generations.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct After {
@@ -314,73 +239,57 @@ impl Display for Totals {
     }
 }
 
+/// Plans a run.
+pub fn plan(args: &Plan) -> Result<bool> {
+    let folder = jobs::plan(args)?;
+    if let Some(engine) = args.submit {
+        print(&format!("planned in {}", folder.display()))?;
+        return submit(&Submit {
+            folder,
+            engine,
+            dry_run: false,
+            inside: false,
+            how: args.how.clone(),
+        });
+    }
+    print(&format!(
+        "planned in {}; go on with: outcrop submit {}",
+        folder.display(),
+        stop::quoted(&folder)
+    ))?;
+    Ok(true)
+}
+
+/// Does the units of a shard.
+pub fn work(args: &Work) -> Result<Ended> {
+    let watch = stop::watched(args.process.quiet);
+    Ok(match jobs::work(args, watch, stop::can_end)? {
+        Worked::Done | Worked::Superseded => Ended::Yes,
+        Worked::TooEarly => Ended::TooEarly(format!(
+            "{}: generation {} has not begun",
+            args.folder.display(),
+            args.generation.unwrap_or_default()
+        )),
+        Worked::Damaged(error) => Ended::Damaged(error),
+    })
+}
+
 /// Does the work between two generations.
 pub fn advance(args: &Advance) -> Result<Ended> {
-    let page = args.report.as_deref().is_some_and(is_page);
-    let folder = pipeline::shared_folder(&args.folder)?;
-    let run = opened(&folder, &args.process, page)?;
-    let mut after = After {
-        finished: true,
-        generation: None,
-        missing: Vec::new(),
-        totals: None,
-        warnings: Vec::new(),
+    let watch = stop::watched(args.process.quiet);
+    let (mut after, output, report) = match jobs::advance(args, watch, stop::can_end)? {
+        Step::Done(done) => (done.after, done.output, done.report),
+        Step::Missing(what) => return Ok(Ended::TooEarly(what)),
+        Step::Damaged(error) => return Ok(Ended::Damaged(error)),
     };
-    match run.advance()? {
-        Advanced::Finished(Some(finished)) => {
-            let (report, totals) = *finished;
-            after.totals = Some(totals);
-            if args.json {
-                after.warnings.clone_from(&report.warnings);
-            }
-            if let Some(path) = &args.report {
-                write_report(path, &report, run.output())?;
-            }
-            if !args.json {
-                print(&summary(&report, run.output()))?;
-            }
-        }
-        Advanced::Finished(None) => {}
-        Advanced::Open(_) | Advanced::Superseded => {
-            // Another process may have finished it meanwhile.
-            if let Ok(status) = pipeline::status(&folder) {
-                after = After {
-                    finished: false,
-                    generation: Some(status.generation),
-                    missing: status.missing(),
-                    totals: Some(status.totals),
-                    warnings: Vec::new(),
-                };
-            }
-        }
-        Advanced::Missing(generation, shards) => {
-            return Ok(Ended::TooEarly(format!(
-                "{}: of generation {generation} {} missing",
-                folder.display(),
-                list(&shards)
-            )));
-        }
-        Advanced::Damaged(error) => return Ok(Ended::Damaged(error)),
+    match (&report, args.json) {
+        (Some(report), true) => after.warnings.clone_from(&report.warnings),
+        (Some(report), false) => print(&summary(report, &output))?,
+        (None, _) => {}
     }
     match args.json {
         true => print(&json(&after)?)?,
         false => print(&after.to_string())?,
     }
     Ok(Ended::Yes)
-}
-
-/// Shards as text.
-fn list(shards: &[u32]) -> String {
-    match shards {
-        [one] => format!("shard {one} is"),
-        shards if shards.len() <= 8 => format!(
-            "shards {} are",
-            shards
-                .iter()
-                .map(u32::to_string)
-                .collect::<Vec<_>>()
-                .join(", ")
-        ),
-        shards => format!("{} shards are", shards.len()),
-    }
 }

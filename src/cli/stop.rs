@@ -6,7 +6,7 @@ use super::progress::{Bars, Nothing, Warnings};
 use crate::pipeline::Reconstruction;
 use crossbeam_channel::{Receiver, after, never, select, tick, unbounded};
 use outcrop_disk::workspace::progress::{Cancel, Observer};
-use outcrop_disk::workspace::{Folder, fault, lock};
+use outcrop_disk::workspace::{Folder, away, fault, lock};
 use outcrop_platform::process::on_stop;
 pub use outcrop_platform::quoted;
 use std::io::IsTerminal;
@@ -102,6 +102,7 @@ fn end(cancel: &Cancel) {
         eprintln!("outcrop: {error}{}", hint());
     }
     fault::finish();
+    away::remove_all();
     std::process::exit(code(cancel.is_expired()).into());
 }
 

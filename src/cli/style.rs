@@ -33,7 +33,7 @@ pub fn seconds(seconds: f64) -> String {
 
 /// True for a write to a closed pipe.
 pub fn is_broken_pipe(error: &Error) -> bool {
-    matches!(error, Error::Io { source, .. } if source.kind() == std::io::ErrorKind::BrokenPipe)
+    matches!(error, Error::Io { source, .. } if outcrop_platform::files::is_broken_pipe(source))
 }
 
 #[cfg(test)]

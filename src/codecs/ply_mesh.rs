@@ -261,6 +261,11 @@ impl AnyPlace {
         read.map_err(converted)
     }
 
+    /// See [`FixedMesh::values`].
+    pub fn values<'a>(&'a self, bytes: &'a [u8], column: usize) -> impl Iterator<Item = f64> + 'a {
+        self.0.values(bytes, column)
+    }
+
     /// See [`FixedMesh::triangles`].
     ///
     /// # Errors

@@ -58,6 +58,37 @@ mod kind {
     pub const BACK: u32 = 0;
     pub const FRONT: u32 = 1;
     pub const RAMP: u32 = 2;
+    pub const SAME: u32 = 3;
+    pub const GROWTH: u32 = 4;
+    pub const LOSS: u32 = 5;
+    pub const ONLY_NEW: u32 = 6;
+    pub const ONLY_OLD: u32 = 7;
+}
+
+/// How a place on a map of change is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tone {
+    /// Nothing changed: nearly white.
+    Same,
+    /// The surface grew: from a pale red to a full one.
+    Growth,
+    /// It lost: from a pale blue to a full one.
+    Loss,
+    /// Only the new surface is there: violet.
+    OnlyNew,
+    /// Only the old one: green.
+    OnlyOld,
+}
+
+/// The colours of [`Tone`].
+mod tone {
+    use outcrop_raster::light::Colour;
+
+    pub const SAME: Colour = [240.0, 240.0, 236.0];
+    pub const GROWTH: [Colour; 2] = [[244.0, 190.0, 176.0], [178.0, 20.0, 32.0]];
+    pub const LOSS: [Colour; 2] = [[178.0, 205.0, 240.0], [22.0, 68.0, 172.0]];
+    pub const ONLY_NEW: Colour = [156.0, 84.0, 196.0];
+    pub const ONLY_OLD: Colour = [52.0, 148.0, 84.0];
 }
 
 /// A picture that is being drawn.
@@ -148,6 +179,27 @@ impl Canvas {
         self.raster.point(at, size, kind::RAMP << 16 | level(share));
     }
 
+    /// Pixels of the picture for one unit of the positions.
+    #[must_use]
+    pub fn pixels(&self) -> f64 {
+        self.camera.scale / FACTOR as f64
+    }
+
+    /// As [`Canvas::point`], in the colours of a map of change; `share` tells how much grew or was lost.
+    pub fn change(&self, p: Vec3, size: f64, (tone, share): (Tone, f64), lift: f64) {
+        let kind = match tone {
+            Tone::Same => kind::SAME,
+            Tone::Growth => kind::GROWTH,
+            Tone::Loss => kind::LOSS,
+            Tone::OnlyNew => kind::ONLY_NEW,
+            Tone::OnlyOld => kind::ONLY_OLD,
+        };
+        let [x, y, depth] = self.camera.project(p);
+        let at = [x, y, depth + lift / self.camera.scale];
+        self.raster
+            .point(at, size * FACTOR as f64, kind << 16 | level(share));
+    }
+
     /// Draws a boundary edge, one of `many`: thinner if they would hide the surface. To be called when all triangles
     /// are drawn.
     pub fn edge(&self, ends: [Vec3; 2], many: u64) {
@@ -173,9 +225,9 @@ impl Canvas {
             match value >> 16 {
                 kind::BACK => BACK.map(|c| c * share),
                 kind::FRONT => FRONT.map(|c| c * share),
-                _ => {
+                other => {
                     let shade = self.light.eye_dome(&self.raster, pixel);
-                    ramp(scale(share)).map(|c| c * shade)
+                    painted(other, scale(share)).map(|c| c * shade)
                 }
             }
         });
@@ -195,6 +247,21 @@ impl Canvas {
         let image = picture::image(&self.raster, FACTOR, |pixel| self.colour(pixel, &scale));
         let scale = self.camera.scale / FACTOR as f64 / unit;
         encoded(name, scale, &image)
+    }
+}
+
+/// The colour of a point, of this kind and at this place on the scale.
+fn painted(kind: u32, share: f64) -> Colour {
+    let share = share.clamp(0.0, 1.0);
+    let between =
+        |[from, to]: [Colour; 2]| std::array::from_fn(|k| from[k] + (to[k] - from[k]) * share);
+    match kind {
+        kind::SAME => tone::SAME,
+        kind::GROWTH => between(tone::GROWTH),
+        kind::LOSS => between(tone::LOSS),
+        kind::ONLY_NEW => tone::ONLY_NEW,
+        kind::ONLY_OLD => tone::ONLY_OLD,
+        _ => ramp(share),
     }
 }
 

@@ -4,30 +4,35 @@
 pub type V3 = [f64; 3];
 
 /// The sum of two vectors.
+#[inline]
 #[must_use]
 pub fn add(a: V3, b: V3) -> V3 {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
 /// The difference of two vectors.
+#[inline]
 #[must_use]
 pub fn sub(a: V3, b: V3) -> V3 {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 /// A vector times a number.
+#[inline]
 #[must_use]
 pub fn scale(a: V3, by: f64) -> V3 {
     a.map(|c| c * by)
 }
 
 /// The scalar product.
+#[inline]
 #[must_use]
 pub fn dot(a: V3, b: V3) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// The vector product.
+#[inline]
 #[must_use]
 pub fn cross(a: V3, b: V3) -> V3 {
     [
@@ -54,18 +59,21 @@ impl Box3 {
     };
 
     /// The smallest box of some points.
+    #[inline]
     #[must_use]
     pub fn of(points: &[V3]) -> Self {
         points.iter().fold(Self::EMPTY, |b, p| b.with(*p))
     }
 
     /// The smallest box of this one and a point.
+    #[inline]
     #[must_use]
     pub fn with(self, p: V3) -> Self {
         self.union(Self { min: p, max: p })
     }
 
     /// The smallest box of both.
+    #[inline]
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         Self {
@@ -75,6 +83,7 @@ impl Box3 {
     }
 
     /// Squared distance to a point; 0 inside.
+    #[inline]
     #[must_use]
     pub fn distance2(&self, p: V3) -> f64 {
         let gap = |i: usize| (self.min[i] - p[i]).max(p[i] - self.max[i]).max(0.0);
@@ -83,6 +92,7 @@ impl Box3 {
     }
 
     /// Squared distance to another box; 0 if they meet.
+    #[inline]
     #[must_use]
     pub fn distance2_box(&self, other: &Self) -> f64 {
         let gap = |i: usize| (self.min[i] - other.max[i]).max(other.min[i] - self.max[i]);

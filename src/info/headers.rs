@@ -1,7 +1,9 @@
 //! Describes a cloud from the headers of its files, without reading points.
 
 use outcrop_disk::error::Result;
-use outcrop_points::{Fetched, Layout, Probe, expand, probe_as};
+use outcrop_disk::workspace::memory::MemoryPool;
+use outcrop_disk::workspace::progress::Cancel;
+use outcrop_points::{Fetched, Probe, Reads, Selection, expand, probe_near};
 use serde::Serialize;
 use std::fmt;
 use std::path::PathBuf;
@@ -17,20 +19,31 @@ pub struct Headers {
     pub points: u64,
     /// Lowest and highest coordinates, each in the unit of its file; none if no header gives any.
     pub bounds: Option<[[f64; 3]; 2]>,
+    /// What a run reads of the files.
+    pub reads: Reads,
+    /// True if that is only what lies in a region.
+    pub is_cropped: bool,
     /// Requests to servers and bytes of their answers; none if all files are local.
     pub fetched: Option<Fetched>,
 }
 
-/// Reads the headers of all files.
+/// Reads the headers of all files, and what tells how much a run with this selection reads of them, which takes
+/// `memory`.
 ///
 /// # Errors
 /// [`outcrop_disk::error::Error::Io`]; [`outcrop_disk::error::Error::Input`] for a file that is no readable point
-/// cloud.
-pub fn headers(inputs: &[PathBuf], layout: &Layout) -> Result<Headers> {
+/// cloud; [`outcrop_disk::error::Error::Memory`], [`outcrop_disk::error::Error::Cancelled`].
+pub fn headers(
+    inputs: &[PathBuf],
+    selection: &Selection,
+    memory: &MemoryPool,
+    cancel: &Cancel,
+) -> Result<Headers> {
     let files = expand(inputs)?;
+    let crop = selection.crop.as_ref();
     let headers: Vec<Probe> = files
         .iter()
-        .map(|file| probe_as(file, layout))
+        .map(|file| probe_near(file, &selection.layout, crop, memory, cancel))
         .collect::<Result<_>>()?;
     let joined = |[a, b]: [[f64; 3]; 2], [c, d]: [[f64; 3]; 2]| {
         let of = |f: fn(f64, f64) -> f64, p: [f64; 3], q: [f64; 3]| {
@@ -46,9 +59,37 @@ pub fn headers(inputs: &[PathBuf], layout: &Layout) -> Result<Headers> {
         bytes: headers.iter().map(|header| header.bytes).sum(),
         points: headers.iter().map(|header| header.points_likely).sum(),
         bounds: headers.iter().filter_map(|h| h.bounds).reduce(joined),
+        reads: headers
+            .iter()
+            .filter_map(|h| h.reads)
+            .reduce(Reads::and)
+            .unwrap_or_default(),
+        is_cropped: crop.is_some(),
         fetched: headers.iter().filter_map(|h| h.fetched).reduce(fetched),
         headers,
     })
+}
+
+impl Headers {
+    /// What a run reads, in one line.
+    fn told(&self) -> String {
+        let shown = |bytes: u64| bytesize::ByteSize(bytes).display().si();
+        let Reads {
+            bytes,
+            bytes_of_all,
+            points,
+            parts,
+            is_estimated,
+        } = self.reads;
+        let about = if is_estimated { "about " } else { "" };
+        let all = shown(bytes_of_all);
+        if !self.is_cropped {
+            return format!("a run reads all: {about}{all}");
+        }
+        let parts = parts.map_or_else(String::new, |n| format!(" in {n} chunks or tiles"));
+        let read = shown(bytes);
+        format!("a run with this --crop reads {about}{read} of {all}: {points} points{parts}")
+    }
 }
 
 impl fmt::Display for Headers {
@@ -87,6 +128,7 @@ impl fmt::Display for Headers {
             "in all {files} files, {} points, {} bytes",
             self.points, self.bytes
         )?;
+        writeln!(f, "{}", self.told())?;
         if let Some(Fetched { requests, bytes }) = self.fetched {
             writeln!(f, "read from servers: {bytes} bytes, {requests} requests")?;
         }

@@ -1,4 +1,5 @@
 //! Checks of meshes, and distances between shapes, without a reconstruction.
 
+pub mod change;
 pub mod compare;
 pub mod verify;

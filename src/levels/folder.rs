@@ -155,9 +155,10 @@ impl Maker<'_> {
         let old = beside(folder, "old");
         remove(&old)?;
         if folder.exists() {
-            std::fs::rename(folder, &old).map_err(failed(folder, "replace"))?;
+            outcrop_platform::rename(folder, &old).map_err(failed(folder, "replace"))?;
         }
-        std::fs::rename(&unfinished, folder).map_err(failed(folder, "give its name to"))?;
+        outcrop_platform::rename(&unfinished, folder)
+            .map_err(failed(folder, "give its name to"))?;
         remove(&old)?;
         observer.end();
         let tiles = self.made.iter().map(|made| u64::from(made.bytes));

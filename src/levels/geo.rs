@@ -44,6 +44,13 @@ enum Plane {
 /// axes.
 const LEAST_VOLUME: f64 = 1e-3;
 
+/// Lengths in metres to which the place of a tileset is rounded, and part of its longest component to which an axis is:
+/// a projection calls the system's `sin` and `cos`, so that its last digits, of 1e-9 m and of 1e-10 of an axis, are not
+/// the same on all systems. Ten kilometres from the middle this moves a point by less than a millimetre; there the globe
+/// is eight metres below the plane.
+const PLACE_STEP: f64 = 1.0 / 65_536.0;
+const AXIS_STEP: f64 = 1.0 / 16_777_216.0;
+
 /// A unit of a system has at least so many metres on the globe; at a pole a degree of longitude has none.
 const LEAST_LENGTH: f64 = 1e-6;
 
@@ -148,12 +155,26 @@ impl Globe {
                 let found = format!("coordinates {x} {y} {z}, which cannot be placed on the globe");
                 Error::input(mesh, "reference system", found, "coordinates in its range")
             })?;
+        let columns = columns.map(rounded);
         let shift = [0, 1, 2].map(|k| {
             let along = (0..3).map(|axis| columns[axis][k] * (origin[axis] - middle[axis]));
-            place[k] + along.sum::<f64>()
+            to_step(place[k] + along.sum::<f64>(), PLACE_STEP)
         });
         Ok(by_columns(columns, shift))
     }
+}
+
+/// The nearest multiple of a step that is a power of two.
+fn to_step(x: f64, step: f64) -> f64 {
+    (x / step).round() * step
+}
+
+/// An axis to [`AXIS_STEP`] of the power of two below its longest component.
+fn rounded(axis: [f64; 3]) -> [f64; 3] {
+    let longest = axis.iter().fold(0.0f64, |most, x| most.max(x.abs()));
+    // Without the bits of its fraction.
+    let power = f64::from_bits(longest.to_bits() >> 52 << 52);
+    axis.map(|x| to_step(x, power * AXIS_STEP))
 }
 
 /// A matrix of 4 by 4.
@@ -238,6 +259,37 @@ mod tests {
             });
             near(mapped, utm.place(position).unwrap(), 2e-3);
         }
+    }
+
+    #[test]
+    fn what_the_library_of_a_system_rounds_does_not_reach_the_matrix() {
+        let axis = [0.612_345_678_901, -0.787_654_321_098, 1e5];
+        let once = rounded(axis);
+        assert_eq!(once, rounded(axis.map(|x| x * (1.0 + 1e-15))));
+        assert_eq!(once, rounded(once));
+        near(once, axis, 65_536.0 * AXIS_STEP);
+        assert_eq!(rounded([1.0, 0.0, -0.25]), [1.0, 0.0, -0.25]);
+        assert_eq!(to_step(-1e6 - 1e-9, PLACE_STEP), -1e6);
+    }
+
+    /// As it is on Linux.
+    #[test]
+    fn the_matrix_is_the_same_on_every_system() {
+        let (origin, middle) = (
+            [630_000.0, 4_833_000.0, 0.0],
+            [630_500.0, 4_833_500.0, 50.0],
+        );
+        let matrix = globe(32617)
+            .unwrap()
+            .matrix(Path::new("mesh.ply"), origin, middle);
+        #[rustfmt::skip]
+        let expected = [
+            0.9853648841381073, 0.1710374355316162, -0.014108002185821533, 0.0,
+            -0.10800927877426147, 0.6819440126419067, 0.7236596047878265, 0.0,
+            0.13334083557128906, -0.7112627327442169, 0.6901634335517883, 0.0,
+            851386.7154998779, -4544207.756393433, 4379121.745635986, 1.0,
+        ];
+        assert_eq!(matrix.unwrap(), expected);
     }
 
     #[test]

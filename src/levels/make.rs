@@ -31,7 +31,7 @@ const PART: usize = 6;
 const MARGIN: f64 = 1.1;
 
 /// Bytes of memory for each triangle of the children while a tile is made from them.
-const EACH: u64 = 420;
+const EACH: u64 = 450;
 
 /// A tile that was made.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]

@@ -21,10 +21,7 @@ impl Surface<'_> {
     }
 }
 
-/// Triangles of a leaf.
-const RUN: usize = 8;
-
-/// Children of a box.
+/// Triangles of a leaf, and children of a box.
 const WIDTH: usize = 8;
 
 /// Bits of a coordinate in the keys by which leaves are sorted.
@@ -50,18 +47,54 @@ impl Bounds {
         }
     }
 
-    /// Squared distance to a point; 0 inside.
-    fn distance2(&self, p: V3) -> f64 {
-        let gap = |k: usize| (self.min[k] - p[k]).max(p[k] - self.max[k]).max(0.0);
-        let (x, y, z) = (gap(0), gap(1), gap(2));
-        x * x + y * y + z * z
+    fn of(corners: impl Iterator<Item = V3>) -> Self {
+        corners.fold(Self::EMPTY, |all, p| all.joined(p, p))
     }
 
-    /// Squared distance of the farthest corner.
-    fn reach2(&self, p: V3) -> f64 {
-        let far = |k: usize| (self.max[k] - p[k]).max(p[k] - self.min[k]);
-        let (x, y, z) = (far(0), far(1), far(2));
-        x * x + y * y + z * z
+    fn of_all(all: &[Self]) -> Self {
+        let all = all.iter();
+        all.fold(Self::EMPTY, |all, one| all.joined(one.min, one.max))
+    }
+}
+
+/// Boxes that are looked at together, in single precision, so a little larger.
+#[derive(Debug, Clone)]
+struct Boxes {
+    min: [[f32; WIDTH]; 3],
+    max: [[f32; WIDTH]; 3],
+}
+
+/// Below 1 by more than all roundings of a squared distance in single precision.
+const ROUNDING: f32 = 0.999_998;
+
+impl Boxes {
+    /// Those behind the last one are empty: infinitely far from everything.
+    fn of(boxes: impl Iterator<Item = Bounds>) -> Self {
+        let mut all = Self {
+            min: [[f32::INFINITY; WIDTH]; 3],
+            max: [[f32::NEG_INFINITY; WIDTH]; 3],
+        };
+        for (lane, one) in boxes.enumerate() {
+            for k in 0..3 {
+                all.min[k][lane] = (one.min[k] as f32).next_down();
+                all.max[k][lane] = (one.max[k] as f32).next_up();
+            }
+        }
+        all
+    }
+
+    /// For each box a squared distance from a point, not more than the true one; 0 inside.
+    fn distances2(&self, p: V3) -> [f32; WIDTH] {
+        let mut sums = [0.0f32; WIDTH];
+        for (k, x) in p.into_iter().enumerate() {
+            let (low, high) = ((x as f32).next_down(), (x as f32).next_up());
+            for (lane, sum) in sums.iter_mut().enumerate() {
+                let gap = (self.min[k][lane] - high).max(low - self.max[k][lane]);
+                let gap = gap.max(0.0);
+                *sum += gap * gap;
+            }
+        }
+        sums.map(|sum| sum * ROUNDING)
     }
 }
 
@@ -70,8 +103,8 @@ pub(super) struct Tree<'a> {
     surface: Surface<'a>,
     /// Numbers of the runs, sorted.
     runs: Vec<u32>,
-    /// Boxes by level: those of the runs first, then those of [`WIDTH`] boxes of the level below, up to a single one.
-    levels: Vec<Vec<Bounds>>,
+    /// The boxes of the triangles of each run, of [`WIDTH`] runs, and so on, up to boxes that have all.
+    levels: Vec<Vec<Boxes>>,
 }
 
 /// Leaf and triangle where the last search ended: the next one, of a point nearby, begins there.
@@ -79,19 +112,13 @@ pub(super) type Hint = (usize, usize);
 
 impl<'a> Tree<'a> {
     pub fn new(surface: Surface<'a>) -> Self {
-        let runs = surface.triangles.chunks(RUN);
-        let boxes: Vec<Bounds> = runs
-            .map(|run| {
-                let corners = run.as_flattened().iter();
-                let corners = corners.map(|corner| surface.points[*corner as usize]);
-                corners.fold(Bounds::EMPTY, |all, p| all.joined(p, p))
-            })
-            .collect();
-        let join = |all: &[Bounds]| {
-            let all = all.iter();
-            all.fold(Bounds::EMPTY, |all, one| all.joined(one.min, one.max))
+        let points = |run: &'a [[u32; 3]]| {
+            let corners = run.as_flattened().iter();
+            corners.map(|corner| surface.points[*corner as usize])
         };
-        let whole = join(&boxes);
+        let runs = surface.triangles.chunks(WIDTH);
+        let boxes: Vec<Bounds> = runs.map(|run| Bounds::of(points(run))).collect();
+        let whole = Bounds::of_all(&boxes);
         let side = (0..3).fold(f64::MIN_POSITIVE, |side: f64, k| {
             side.max(whole.max[k] - whole.min[k])
         });
@@ -104,11 +131,23 @@ impl<'a> Tree<'a> {
         let mut placed: Vec<(u64, u32)> = numbered.map(|(one, n)| (place(one), n)).collect();
         placed.sort_unstable();
         let runs: Vec<u32> = placed.into_iter().map(|(_, n)| n).collect();
-        let mut levels = vec![runs.iter().map(|n| boxes[*n as usize]).collect::<Vec<_>>()];
-        while let Some(last) = levels.last()
-            && last.len() > 1
-        {
-            levels.push(last.chunks(WIDTH).map(join).collect());
+        let triangles = |run: &u32| {
+            let first = *run as usize * WIDTH;
+            let end = (first + WIDTH).min(surface.triangles.len());
+            let run = surface.triangles[first..end].iter();
+            Boxes::of(run.map(|t| Bounds::of(points(std::slice::from_ref(t)))))
+        };
+        let mut levels = vec![runs.iter().map(triangles).collect::<Vec<_>>()];
+        let mut boxes: Vec<Bounds> = runs.iter().map(|n| boxes[*n as usize]).collect();
+        while boxes.len() > 1 {
+            let above = boxes.chunks(WIDTH);
+            levels.push(
+                above
+                    .clone()
+                    .map(|b| Boxes::of(b.iter().copied()))
+                    .collect(),
+            );
+            boxes = above.map(Bounds::of_all).collect();
         }
         Self {
             surface,
@@ -159,12 +198,6 @@ impl Search<'_> {
     /// Looks at a triangle; true if that is enough.
     fn is_enough(&mut self, triangle: usize) -> bool {
         let corners = self.tree.surface.corners(triangle);
-        let around = corners
-            .iter()
-            .fold(Bounds::EMPTY, |all, p| all.joined(*p, *p));
-        if around.distance2(self.p) > self.best2 {
-            return false;
-        }
         let found = distance2(&corners, self.p);
         self.best2 = self.best2.min(found);
         found <= self.enough2
@@ -172,14 +205,15 @@ impl Search<'_> {
 
     /// Looks at the triangles of a leaf; returns the one that is enough.
     fn leaf(&mut self, leaf: usize) -> Option<Hint> {
-        let first = self.tree.runs[leaf] as usize * RUN;
-        if self.tree.levels[0][leaf].reach2(self.p) <= self.enough2 {
-            self.best2 = self.enough2;
-            return Some((leaf, first));
+        let first = self.tree.runs[leaf] as usize * WIDTH;
+        let boxes = self.tree.levels[0][leaf].distances2(self.p);
+        for (triangle, distance2) in (first..).zip(boxes) {
+            let is_near = f64::from(distance2) <= self.best2 && distance2 < f32::INFINITY;
+            if is_near && self.is_enough(triangle) {
+                return Some((leaf, triangle));
+            }
         }
-        let end = (first + RUN).min(self.tree.surface.triangles.len());
-        let found = (first..end).find(|triangle| self.is_enough(*triangle));
-        found.map(|triangle| (leaf, triangle))
+        None
     }
 
     /// Looks at all that is in a box, the nearest first; returns the triangle that is enough. The depth of the
@@ -188,25 +222,22 @@ impl Search<'_> {
         if level == 0 {
             return self.leaf(number);
         }
-        let inside = &self.tree.levels[level - 1];
-        let first = number * WIDTH;
-        let inside = &inside[first..(first + WIDTH).min(inside.len())];
+        let boxes = self.tree.levels[level][number].distances2(self.p);
         let mut near = [(0.0, 0); WIDTH];
         let mut count = 0;
-        for (child, one) in inside.iter().enumerate() {
-            let distance2 = one.distance2(self.p);
-            if distance2 < self.best2 {
+        for (child, distance2) in (number * WIDTH..).zip(boxes) {
+            if f64::from(distance2) <= self.best2 && distance2 < f32::INFINITY {
                 let mut at = count;
                 while at > 0 && near[at - 1].0 > distance2 {
                     near[at] = near[at - 1];
                     at -= 1;
                 }
-                near[at] = (distance2, first + child);
+                near[at] = (distance2, child);
                 count += 1;
             }
         }
         for (distance2, child) in near[..count].iter().copied() {
-            if distance2 >= self.best2 {
+            if f64::from(distance2) > self.best2 {
                 break;
             }
             let found = self.below(level - 1, child);

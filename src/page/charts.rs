@@ -25,7 +25,22 @@ pub fn lengths(name: &str, histogram: &Histogram, note: &str) -> Markup {
     let line = html! {
         (spread(histogram.p5, histogram.p50, histogram.p95)) ", longest " (length(histogram.max))
     };
-    chart(name, histogram, &label, &ticks, &line, note)
+    chart(name, histogram, &label, (&ticks, &[]), &line, note)
+}
+
+/// A distribution of changes, growth to the right, with the limits of what is no more than noise.
+pub fn changes(name: &str, histogram: &Histogram, limit: f64, note: &str) -> Markup {
+    let label = |bin: &Bin| format!("{} to {}", length(bin.from), length(bin.to));
+    let end = histogram.bins.last().map_or(1.0, |bin| bin.to);
+    let place = |change: f64| (change / end + 1.0) / 2.0;
+    let tick = |share: f64| (place(share * end), length(share * end));
+    let ticks = [-1.0, -0.5, 0.0, 0.5, 1.0].map(tick);
+    let limits = [-limit, limit].map(place);
+    let line = html! {
+        (spread(histogram.p5, histogram.p50, histogram.p95)) ", from " (length(histogram.min)) " to "
+        (length(histogram.max))
+    };
+    chart(name, histogram, &label, (&ticks, &limits), &line, note)
 }
 
 /// A distribution of numbers by powers of two.
@@ -46,14 +61,15 @@ pub fn sizes(name: &str, histogram: &Histogram, note: &str) -> Markup {
         .map(|(n, bin)| ((n as f64 + 0.5) / bins, short(bin)))
         .collect();
     let line = html! { (count(histogram.count)) " in all, largest " (count(histogram.max as u64)) };
-    chart(name, histogram, &label, &ticks, &line, note)
+    chart(name, histogram, &label, (&ticks, &[]), &line, note)
 }
 
+/// A chart with texts of bars, and ticks and limits at shares of the width.
 fn chart(
     name: &str,
     histogram: &Histogram,
     label: &dyn Fn(&Bin) -> String,
-    ticks: &[(f64, String)],
+    (ticks, limits): (&[(f64, String)], &[f64]),
     line: &Markup,
     note: &str,
 ) -> Markup {
@@ -80,6 +96,9 @@ fn chart(
                         width=(num((wide - 1.0).max(0.5))) height=(num(tall(bin))) {
                         title { (label(bin)) ": " (bin.count) }
                     }
+                }
+                @for x in limits.iter().map(|share| num(share * WIDTH)) {
+                    line.limit x1=(x) x2=(x) y1=(TOP) y2=(floor) {}
                 }
                 line.axis x1="0" x2=(WIDTH) y1=(floor) y2=(floor) {}
                 text x="0" y="10" { "up to " (most) " in a bar" }

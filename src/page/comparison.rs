@@ -108,7 +108,8 @@ fn distances(comparison: &Comparison) -> Markup {
     }
 }
 
-fn side(side: &Side) -> Markup {
+/// A table about one side.
+pub(super) fn side(side: &Side) -> Markup {
     let mesh = side.kind == Kind::Mesh;
     list(&[
         ("file", shown(path(&side.path))),

@@ -17,6 +17,7 @@
 //! ```
 
 mod advice;
+mod change;
 mod charts;
 mod cloud;
 mod comparison;
@@ -25,6 +26,7 @@ mod sheet;
 mod verdict;
 mod words;
 
+pub use change::change;
 pub use cloud::cloud;
 pub use comparison::comparison;
 pub use report::report;

@@ -2,6 +2,7 @@
 
 use super::builder::open_of;
 use super::manifest::Manifest;
+use super::shared::is_store;
 use super::{Reconstruction, Start, beside, levels};
 use crossbeam_channel::{RecvTimeoutError, Sender, bounded};
 use outcrop_disk::error::{Error, Result};
@@ -47,12 +48,33 @@ impl Reconstruction {
     }
 
     pub(super) fn open(&self) -> Result<Workspace> {
+        if is_store(&self.folder) {
+            return Err(Error::Parameter {
+                name: "scratch",
+                found: self.folder.display().to_string(),
+                expected: "a folder; runs that tasks share (`outcrop plan`) can be in a store"
+                    .into(),
+            });
+        }
         let manifest = Manifest::of(self)?;
         let bytes = manifest.to_bytes()?;
         let found = match self.start {
             Start::Resume => Folder::find_when_free(&self.folder, &*self.observer, &self.cancel)?,
             Start::New | Start::Restart => Folder::find(&self.folder)?,
         };
+        let is_left = matches!(found, Found::Run(_) | Found::Damaged(_));
+        if is_left && self.start == Start::New && self.is_unfinished() {
+            return Err(Error::Unfinished {
+                path: self.folder.clone(),
+            });
+        }
+        if let Some(delivery) = &self.delivery
+            && !matches!((&found, self.start), (Found::Run(_), Start::Resume))
+        {
+            delivery
+                .begin()
+                .inspect_err(|_| delivery.end(&*self.observer))?;
+        }
         let mut folder = match (found, self.start) {
             (Found::Nothing, _) => Folder::create(&self.folder, bytes)?,
             (Found::Run(folder), Start::Resume) => {
@@ -62,11 +84,6 @@ impl Reconstruction {
                 }
                 was.check(&manifest, &self.folder)?;
                 folder
-            }
-            (Found::Run(_) | Found::Damaged(_), Start::New) if self.is_unfinished() => {
-                return Err(Error::Unfinished {
-                    path: self.folder.clone(),
-                });
             }
             (Found::Run(folder) | Found::Damaged(folder), _) => folder.restart(bytes)?,
         };
@@ -106,6 +123,9 @@ impl Reconstruction {
             }
             if self.params.split.is_some() {
                 export::remove_unfinished(&self.mesh);
+            }
+            if let Some(delivery) = &self.delivery {
+                delivery.end(&*self.observer);
             }
         }
         // The workspace has the lock, which must outlive the files.

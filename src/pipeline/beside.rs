@@ -7,6 +7,7 @@
 use crate::report::Report;
 use outcrop_disk::error::{Error, Result};
 use outcrop_mesh_files::export::{extensions, folder_of, is_compressed};
+use outcrop_platform::canonical;
 use outcrop_points::Crs;
 use serde::Serialize;
 use std::ffi::OsString;
@@ -59,8 +60,8 @@ pub(super) fn write(
     let path = path_beside(output, "prj");
     // That of an input stays as it is.
     let of_input = outcrop_points::expand(inputs)?.iter().any(|input| {
-        let other = outcrop_points::prj_of(input).canonicalize();
-        other.is_ok_and(|other| path.canonicalize().is_ok_and(|path| path == other))
+        let other = canonical(&outcrop_points::prj_of(input));
+        other.is_ok_and(|other| canonical(&path).is_ok_and(|path| path == other))
     });
     match wkt {
         _ if of_input => {}
@@ -202,7 +203,7 @@ fn put(path: &Path, bytes: &[u8]) -> Result<()> {
         let mut file = std::fs::File::create_new(&temporary)?;
         file.write_all(bytes)?;
         file.sync_all()?;
-        std::fs::rename(&temporary, path)
+        outcrop_platform::rename(&temporary, path)
     };
     write().map_err(|e| {
         let _ = std::fs::remove_file(&temporary);

@@ -2,8 +2,10 @@
 
 use super::manifest::Manifest;
 use super::resources::{Resources, resource_setters};
+use super::shared::Copies;
 use super::start::{Start, scratch_folder};
 use super::{Reconstruction, levels, made};
+use crate::deliver::{Delivery, Kind};
 use crate::features::PAGES;
 use crate::params::Params;
 use outcrop_disk::error::{Error, Remedy, Result, Setting};
@@ -29,6 +31,7 @@ pub struct Builder {
     folder: Option<PathBuf>,
     time_limit: Option<Duration>,
     pictures: bool,
+    copies: Copies,
 }
 
 impl Builder {
@@ -40,7 +43,8 @@ impl Builder {
     }
 
     /// Path of the mesh. Its extension selects the format: `.ply`, `.obj`, `.stl` or `.glb`; with `.zst`
-    /// behind it the mesh is compressed. `DIR/tileset.json` makes levels of detail in that folder.
+    /// behind it the mesh is compressed. `DIR/tileset.json` makes levels of detail in that folder. A URL of a store
+    /// is one too, such as `s3://bucket/mesh.ply`.
     #[must_use]
     pub fn output(mut self, path: impl Into<PathBuf>) -> Self {
         self.output = path.into();
@@ -85,6 +89,20 @@ impl Builder {
         self
     }
 
+    /// Folder for copies of scratch files that are in a store, and their most bytes; default: the folder for
+    /// temporary files, and 4 GiB.
+    #[must_use]
+    pub fn copies(mut self, folder: Option<PathBuf>, limit: Option<u64>) -> Self {
+        self.copies = Copies::new(folder, limit);
+        self
+    }
+
+    /// The same, all at once.
+    pub(super) fn with_copies(mut self, copies: Copies) -> Self {
+        self.copies = copies;
+        self
+    }
+
     /// The scratch folder of the run.
     pub(super) fn folder(mut self, folder: PathBuf) -> Self {
         self.folder = Some(folder);
@@ -113,24 +131,31 @@ impl Builder {
         if self.output.as_os_str().is_empty() {
             return missing("output", "the path of the mesh");
         }
-        let tiles = levels::folder(&self.output, &self.params)?;
-        let made = made::output(&self.output, &self.params, tiles.is_some())?;
-        let target = tiles.as_deref().unwrap_or(&self.output);
+        let parent = self.resources.scratch.as_deref();
+        let delivery = Delivery::of(&self.output, Kind::Mesh, parent, self.folder.as_deref())?;
+        let local = delivery.as_ref().map_or(&*self.output, Delivery::local);
+        let tiles = levels::folder(local, &self.params)?;
+        let made = made::output(local, &self.params, tiles.is_some())?;
+        let target = tiles.as_deref().unwrap_or(local);
         let mesh = (tiles.is_some() || made.is_some()).then(|| mesh_of(target));
-        let named = mesh.as_deref().unwrap_or(&self.output);
+        let named = mesh.as_deref().unwrap_or(local);
         if self.folder.is_some() && check_name(named, true).is_err() {
             // An unfinished run whose mesh was a GLB, and is to be another now.
             self.params.compress_glb = false;
         }
         check_name(named, self.params.compress_glb)?;
         let resources = self.resources;
-        let folder = scratch_folder(target, resources.scratch.as_deref());
+        let folder = match &delivery {
+            Some(delivery) => delivery.scratch().to_path_buf(),
+            None => scratch_folder(target, resources.scratch.as_deref()),
+        };
         Ok(Reconstruction {
             goes_on: self.folder.is_some(),
             folder: self.folder.unwrap_or(folder),
             inputs: self.inputs,
-            output: self.output.clone(),
-            mesh: mesh.unwrap_or(self.output),
+            mesh: mesh.unwrap_or_else(|| local.to_path_buf()),
+            delivery,
+            output: self.output,
             made,
             tiles,
             memory: MemoryPool::new(resources.memory())?,
@@ -144,6 +169,7 @@ impl Builder {
             start: resources.start,
             time_limit: self.time_limit,
             pictures: self.pictures,
+            copies: self.copies,
         })
     }
 }

@@ -6,7 +6,7 @@ use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::{Workspace, limits};
 use outcrop_geom::lattice::Lattice;
 use outcrop_mesh_files::export::{folder_of, is_square_of};
-use outcrop_platform::device;
+use outcrop_platform::{canonical, device, no_name};
 use outcrop_points::Classes;
 use outcrop_stages::cells::{CellStats, DiskRadius};
 use outcrop_stages::order::StoredPoints;
@@ -41,6 +41,14 @@ pub(super) fn writable(output: &Path) -> Result<()> {
         let error = std::io::Error::from(std::io::ErrorKind::IsADirectory);
         return Err(Error::io(output, "write the mesh", error));
     }
+    let name = output.file_name().unwrap_or_default().to_string_lossy();
+    if let Some(why) = no_name(&name) {
+        return Err(Error::Parameter {
+            name: "output",
+            found: format!("{} ({why})", output.display()),
+            expected: "another name".into(),
+        });
+    }
     tempfile::tempfile_in(folder_of(output))
         .map(drop)
         .map_err(|e| Error::io(output, "write the mesh into this folder", e))
@@ -73,7 +81,7 @@ pub(super) fn room(
 
 /// Checks that the output is not an input file.
 pub(super) fn not_an_input(output: &Path, split: bool, inputs: &[PathBuf]) -> Result<()> {
-    let absolute = |path: &Path| path.canonicalize().ok();
+    let absolute = |path: &Path| canonical(path).ok();
     let folder = absolute(folder_of(output));
     let several = folder.map(|folder| folder.join(output.file_name().unwrap_or_default()));
     for input in outcrop_points::expand(inputs)?.iter().filter(|_| split) {
@@ -92,11 +100,11 @@ pub(super) fn not_an_input(output: &Path, split: bool, inputs: &[PathBuf]) -> Re
     if split {
         return Ok(());
     }
-    let Ok(output) = output.canonicalize() else {
+    let Ok(output) = canonical(output) else {
         return Ok(());
     };
     for input in outcrop_points::expand(inputs)? {
-        if input.canonicalize().is_ok_and(|input| input == output) {
+        if canonical(&input).is_ok_and(|input| input == output) {
             return Err(Error::Parameter {
                 name: "output",
                 found: format!("{} (an input)", output.display()),

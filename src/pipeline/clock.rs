@@ -3,6 +3,7 @@
 use crate::report::{PartReport, StageReport};
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::Workspace;
+use outcrop_disk::workspace::limits::cpu_seconds;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
@@ -23,6 +24,8 @@ pub(crate) struct Clock<'a> {
 #[derive(Serialize, Deserialize)]
 struct Took {
     seconds: f64,
+    /// Processor time of all threads.
+    cpu: f64,
     read: u64,
     written: u64,
     scratch: u64,
@@ -65,7 +68,8 @@ impl<'a> Clock<'a> {
         let (value, took) = workspace.once(step, |_| {
             now = true;
             let io = &workspace.io;
-            let (start, read, written) = (Instant::now(), io.read(), io.written());
+            let (start, cpu) = (Instant::now(), cpu_seconds());
+            let (read, written) = (io.read(), io.written());
             io.begin_stage();
             // Usage before the stage does not count for it.
             let _ = workspace.memory.take_held();
@@ -75,6 +79,7 @@ impl<'a> Clock<'a> {
             let parts = workspace.take_parts().into_iter();
             let took = Took {
                 seconds: start.elapsed().as_secs_f64(),
+                cpu: cpu_seconds() - cpu,
                 read: io.read() - read,
                 written: io.written() - written,
                 scratch: io.stage_peak(),
@@ -94,6 +99,8 @@ impl<'a> Clock<'a> {
         self.stages.push(StageReport {
             name,
             seconds: took.seconds,
+            cpu_seconds: took.cpu,
+            serial_seconds: serial(took.seconds, took.cpu, workspace.threads),
             bytes_read: took.read,
             bytes_written: took.written,
             scratch_bytes: took.scratch,
@@ -103,5 +110,30 @@ impl<'a> Clock<'a> {
                 .collect(),
         });
         Ok(value)
+    }
+}
+
+/// Seconds in which one thread worked while the others waited, if in all other seconds all of them worked: by Amdahl's
+/// law, more threads do not make this part shorter. Waiting for the disk counts as well.
+fn serial(seconds: f64, cpu: f64, threads: usize) -> f64 {
+    let threads = threads as f64;
+    match threads > 1.0 {
+        true => ((threads * seconds - cpu) / (threads - 1.0)).clamp(0.0, seconds),
+        false => seconds,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::serial;
+
+    #[test]
+    fn what_one_thread_does_is_serial() {
+        // Two seconds by one thread, and eight seconds of four.
+        assert_eq!(serial(10.0, 2.0 + 4.0 * 8.0, 4), 2.0);
+        assert_eq!(serial(10.0, 20.0, 2), 0.0);
+        assert_eq!(serial(10.0, 10.0, 2), 10.0);
+        assert_eq!(serial(10.0, 25.0, 2), 0.0);
+        assert_eq!(serial(10.0, 9.0, 1), 10.0);
     }
 }

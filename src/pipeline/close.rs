@@ -1,9 +1,10 @@
 //! A run that closes a mesh, and that can be resumed.
 
-use super::like::Like;
+use super::like::{Like, is_one_of};
 use super::mesh_job::MeshJob;
 use super::resources::{Resources, resource_setters};
 use super::{Start, start::scratch_folder};
+use crate::deliver::{self, Delivery};
 use crate::params::Close;
 use crate::report::CloseReport;
 use crate::write::{Bounds, Writer, write};
@@ -21,6 +22,7 @@ use std::sync::Arc;
 const FORMAT: &str = "close 1";
 
 /// The making of a mesh without a boundary.
+#[derive(Clone)]
 pub struct Closing {
     mesh: PathBuf,
     output: PathBuf,
@@ -62,13 +64,26 @@ impl Closing {
     /// [`Error::Io`], [`Error::Disk`], [`Error::Corrupt`], [`Error::Cancelled`]; those of an unfinished run, as of
     /// [`crate::Reconstruction::run`].
     pub fn run(&self) -> Result<CloseReport> {
+        let scratch = self.resources.scratch.as_deref();
+        match Delivery::of(&self.output, deliver::Kind::Mesh, scratch, None)? {
+            None => self.run_to(None),
+            Some(delivery) => {
+                let mut local = self.clone();
+                local.output = delivery.local().to_path_buf();
+                local.run_to(Some(&delivery))
+            }
+        }
+    }
+
+    fn run_to(&self, delivery: Option<&Delivery>) -> Result<CloseReport> {
         check_output(&self.mesh, &self.output)?;
         let job = MeshJob {
             format: FORMAT,
-            mesh: &self.mesh,
+            inputs: std::slice::from_ref(&self.mesh),
             output: &self.output,
             options: &self.kind,
             resources: &self.resources,
+            delivery,
         };
         job.run(
             |workspace| closed(&self.mesh, &self.output, self.kind, workspace),
@@ -90,8 +105,7 @@ pub(super) fn check_output(mesh: &Path, output: &Path) -> Result<()> {
     if export::is_compressed(output) {
         return refuse("a name that does not end with .zst");
     }
-    let whole = |path: &Path| path.canonicalize().ok();
-    match whole(mesh).is_some_and(|mesh| whole(output) == Some(mesh)) {
+    match is_one_of(output, &[mesh]) {
         true => refuse("another file than the mesh"),
         false => Ok(()),
     }

@@ -8,13 +8,11 @@ pub use made::make;
 #[cfg(feature = "levels")]
 pub use outcrop_levels::{check_folder, outlook, remove_unfinished};
 
+use crate::deliver::TREE;
 use crate::features::LEVELS;
 use crate::params::Params;
 use outcrop_disk::error::{Error, Result};
 use std::path::{Path, PathBuf};
-
-/// The name of the file that is asked for.
-const NAME: &str = "tileset.json";
 
 /// The folder of the tileset, if the output is one.
 pub fn folder(output: &Path, params: &Params) -> Result<Option<PathBuf>> {
@@ -25,7 +23,7 @@ pub fn folder(output: &Path, params: &Params) -> Result<Option<PathBuf>> {
             expected: expected.into(),
         })
     };
-    match output.file_name().is_some_and(|name| name == NAME) {
+    match output.file_name().is_some_and(|name| name == TREE) {
         true => LEVELS.require()?,
         false if params.lossy => {
             let expected = "DIR/tileset.json, for only tilesets are rounded";

@@ -7,6 +7,13 @@ use outcrop_mesh_files::export::{self, CoordinateType, Mesh, VertexColumn};
 use outcrop_ply::Place;
 use std::path::Path;
 
+/// True if the output is one of the files that are read, by whatever name.
+pub(super) fn is_one_of(output: &Path, read: &[&Path]) -> bool {
+    let whole = |path: &Path| outcrop_platform::canonical(path).ok();
+    let own = whole(output);
+    own.is_some() && read.iter().any(|path| whole(path) == own)
+}
+
 /// A mesh, and the file of one that is made of it.
 pub(super) struct Like<'a> {
     pub mesh: &'a Path,

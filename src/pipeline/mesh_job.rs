@@ -1,67 +1,111 @@
-//! A run on a finished mesh, which can be resumed: its manifest and its scratch folder.
+//! A run on finished meshes or on clouds, which can be resumed: its manifest and its scratch folder.
 
 use super::resources::Resources;
 use super::{Start, start::scratch_folder};
+use crate::deliver::Delivery;
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::memory::MemoryPool;
 use outcrop_disk::workspace::{Folder, Found, Workspace, fault};
 use outcrop_platform::{FileAt, modified};
+use outcrop_points::{expand, is_remote};
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-/// A run that makes something of a mesh.
+/// A run that makes something of meshes or clouds.
 pub(super) struct MeshJob<'a, O> {
     /// The version of what a resumed run reads.
     pub format: &'static str,
-    pub mesh: &'a Path,
+    pub inputs: &'a [PathBuf],
     pub output: &'a Path,
     /// The options that decide the result.
     pub options: &'a O,
     pub resources: &'a Resources,
+    /// The way of the output to a store, if it is behind a URL.
+    pub delivery: Option<&'a Delivery>,
 }
 
-/// Mesh and options of a run, by which it is resumed.
+/// Inputs and options of a run, by which it is resumed.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 struct Manifest<O> {
     format: String,
     version: String,
-    mesh: PathBuf,
+    inputs: Vec<PathBuf>,
     output: PathBuf,
     options: O,
+    seen: Seen,
+}
+
+/// Size in bytes, time of change and checksum of the inputs: a resumed run notices other files of the same names.
+#[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
+struct Seen {
     bytes: u64,
+    /// The latest change.
     modified: (i64, i64),
     sample: u32,
 }
 
-/// Bytes at each end of the mesh by which another content is noticed.
+/// Bytes at each end of a file by which another content is noticed.
 const SAMPLE: u64 = 1 << 16;
+
+impl Seen {
+    /// Looks at the inputs, and at the clouds in those that are folders.
+    fn of(inputs: &[PathBuf]) -> Result<Self> {
+        let (mut seen, mut crc) = (Self::default(), crc32fast::Hasher::new());
+        for input in inputs {
+            let files = match !is_remote(input) && input.is_dir() {
+                true => expand(std::slice::from_ref(input))?,
+                false => vec![input.clone()],
+            };
+            for path in &files {
+                if is_remote(path) {
+                    // Each attempt reads one version of it, or no more than what an earlier one read.
+                    crc.update(path.as_os_str().as_encoded_bytes());
+                    continue;
+                }
+                let read = seen.look(path, &mut crc);
+                read.map_err(|e| Error::io(path, "read", e))?;
+            }
+        }
+        seen.sample = crc.finalize();
+        Ok(seen)
+    }
+
+    fn look(&mut self, path: &Path, crc: &mut crc32fast::Hasher) -> std::io::Result<()> {
+        let file = File::open(path)?;
+        let about = file.metadata()?;
+        for at in [0, about.len().saturating_sub(SAMPLE)] {
+            let mut bytes = vec![0; (about.len() - at).min(SAMPLE) as usize];
+            file.read_exact_at(&mut bytes, at)?;
+            crc.update(&bytes);
+        }
+        self.bytes += about.len();
+        self.modified = self.modified.max(modified(&about));
+        Ok(())
+    }
+}
 
 impl<O: Clone + Serialize> Manifest<O> {
     fn of(job: &MeshJob<'_, O>) -> Result<Self> {
-        let path = job.mesh;
-        let read = || {
-            let file = File::open(path)?;
-            let about = file.metadata()?;
-            let mut crc = crc32fast::Hasher::new();
-            for at in [0, about.len().saturating_sub(SAMPLE)] {
-                let mut bytes = vec![0; (about.len() - at).min(SAMPLE) as usize];
-                file.read_exact_at(&mut bytes, at)?;
-                crc.update(&bytes);
-            }
-            Ok((about, crc.finalize()))
-        };
-        let (about, sample) = read().map_err(|e| Error::io(path, "read", e))?;
         let whole = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+        let url = job.delivery.map(|delivery| delivery.url().to_path_buf());
         Ok(Self {
             format: job.format.into(),
             version: env!("CARGO_PKG_VERSION").into(),
-            mesh: whole(path),
-            output: whole(job.output),
+            inputs: job
+                .inputs
+                .iter()
+                .map(|path| {
+                    if is_remote(path) {
+                        path.clone()
+                    } else {
+                        whole(path)
+                    }
+                })
+                .collect(),
+            output: url.unwrap_or_else(|| whole(job.output)),
             options: job.options.clone(),
-            bytes: about.len(),
-            modified: modified(&about),
-            sample,
+            seen: Seen::of(job.inputs)?,
         })
     }
 
@@ -91,7 +135,10 @@ impl<O: Clone + Serialize> Manifest<O> {
 
 impl<O: Clone + Serialize> MeshJob<'_, O> {
     fn scratch(&self) -> PathBuf {
-        scratch_folder(self.output, self.resources.scratch.as_deref())
+        match self.delivery {
+            Some(delivery) => delivery.scratch().to_path_buf(),
+            None => scratch_folder(self.output, self.resources.scratch.as_deref()),
+        }
     }
 
     fn open(&self) -> Result<Workspace> {
@@ -106,14 +153,24 @@ impl<O: Clone + Serialize> MeshJob<'_, O> {
             Start::Resume => Folder::find_when_free(&path, &**observer, cancel)?,
             Start::New | Start::Restart => Folder::find(&path)?,
         };
+        let is_left = matches!(found, Found::Run(_) | Found::Damaged(_));
+        if is_left && self.resources.start == Start::New && Folder::has_progress(&path) {
+            return Err(Error::Unfinished { path });
+        }
+        if let Some(delivery) = self.delivery
+            && !matches!(
+                (&found, self.resources.start),
+                (Found::Run(_), Start::Resume)
+            )
+        {
+            let begun = delivery.begin();
+            begun.inspect_err(|_| delivery.end(&*self.resources.observer))?;
+        }
         let folder = match (found, self.resources.start) {
             (Found::Nothing, _) => Folder::create(&path, bytes)?,
             (Found::Run(folder), Start::Resume) => {
                 manifest.check(&folder.manifest, &path)?;
                 folder
-            }
-            (Found::Run(_) | Found::Damaged(_), Start::New) if Folder::has_progress(&path) => {
-                return Err(Error::Unfinished { path });
             }
             (Found::Run(folder) | Found::Damaged(folder), _) => folder.restart(bytes)?,
         };
@@ -130,18 +187,40 @@ impl<O: Clone + Serialize> MeshJob<'_, O> {
         Ok(workspace)
     }
 
+    /// Sends the output to a store, if it is behind a URL.
+    fn deliver(&self, workspace: &Workspace) -> Result<()> {
+        let Some(delivery) = self.delivery else {
+            return Ok(());
+        };
+        let observer = &workspace.observer;
+        observer.begin("upload", "bytes", delivery.bytes()?);
+        let send = || delivery.send(workspace, &mut |warning| observer.warn(&warning));
+        workspace.once("upload", |_| send())?;
+        observer.end();
+        Ok(())
+    }
+
     /// Does `make` in the scratch folder, and `clean` if the run cannot be resumed.
     pub fn run<T>(
         &self,
         make: impl FnOnce(&Workspace) -> Result<T>,
         clean: impl FnOnce(),
     ) -> Result<T> {
+        if let Some(delivery) = self.delivery {
+            delivery.prepare()?;
+        }
         let workspace = self.open()?;
-        let outcome = make(&workspace);
+        let outcome = make(&workspace).and_then(|made| {
+            self.deliver(&workspace)?;
+            Ok(made)
+        });
         let keep = outcome.as_ref().is_err_and(Error::can_resume);
         if !(keep && Folder::has_progress(&self.scratch())) {
             workspace.remove(outcome.is_ok());
             clean();
+            if let Some(delivery) = self.delivery {
+                delivery.end(&*self.resources.observer);
+            }
         }
         drop(workspace);
         fault::finish();

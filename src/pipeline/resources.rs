@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Resources of a run; all have defaults.
+#[derive(Clone)]
 pub(super) struct Resources {
     pub scratch: Option<PathBuf>,
     pub memory: Option<u64>,

@@ -3,22 +3,28 @@
 
 use super::checks::{all_are_kept, not_an_input, one_system, writable};
 use super::manifest::Manifest;
-use super::{Builder, Known, Reconstruction, made};
+use super::{Builder, Known, Reconstruction, Start, made};
 use crate::report::Report;
 use outcrop_disk::error::{Error, Result};
+use outcrop_disk::workspace::away::Traffic;
 use outcrop_disk::workspace::generations::{Generation, Opened, Resources, SharedFolder};
 use outcrop_disk::workspace::journal::{Sharing, Took};
 use outcrop_disk::workspace::{Workspace, limits};
 use outcrop_mesh_files::export;
 use std::hash::{BuildHasher, Hasher};
-use std::io::Read;
 use std::path::Path;
 use std::time::{Instant, SystemTime};
 
 mod find;
+mod place;
+mod program;
 mod status;
 
 pub use find::shared_folder;
+pub(crate) use place::Copies;
+pub(super) use place::{below, is_store};
+pub use program::part_of;
+use program::program;
 pub use status::{Begun, Status, TaskState, Totals, status};
 
 /// Largest number of shards: array jobs of Slurm end here by default.
@@ -52,43 +58,36 @@ pub enum Advanced {
     Finished(Option<Box<(Report, Totals)>>),
 }
 
-/// Checksum of this program, with its version.
-fn program() -> Result<u32> {
-    let path = outcrop_platform::program().map_err(|e| Error::io("outcrop", "find", e))?;
-    let io = |e| Error::io(&path, "read", e);
-    let mut file = std::fs::File::open(&path).map_err(io)?;
-    let mut crc = crc32fast::Hasher::new();
-    let mut buffer = vec![0; 1 << 20];
-    loop {
-        match file.read(&mut buffer).map_err(io)? {
-            0 => break,
-            n => crc.update(&buffer[..n]),
-        }
-    }
-    crc.update(env!("CARGO_PKG_VERSION").as_bytes());
-    Ok(crc.finalize())
-}
-
 /// The number of shards that were planned for the run in a folder.
 ///
 /// # Errors
 /// [`Error::NotResumable`], [`Error::Io`], [`Error::Corrupt`].
-pub fn planned_shards(folder: &Path) -> Result<u32> {
-    Ok(SharedFolder::open(folder)?.sharing()?.shards)
+pub(crate) fn planned_shards(folder: &Path, copies: &Copies) -> Result<u32> {
+    Ok(place::open(folder, copies)?.sharing()?.shards)
 }
 
 impl Reconstruction {
     /// Plans a run that tasks share in `shards` shards. The threads and the memory of this run are those of
-    /// each task. Returns its folder.
+    /// each task. Returns its folder. A run that was planned before goes on if it is to be resumed, with the shards,
+    /// threads and memory of then.
     ///
     /// # Errors
-    /// [`Error::Parameter`]; [`Error::NotResumable`] if the folder exists; [`Error::Io`].
+    /// [`Error::Parameter`]; [`Error::NotResumable`] if the folder exists; [`Error::Mismatch`] if the run in it is
+    /// another one; [`Error::Io`].
     pub fn plan(&self, shards: u32) -> Result<&Path> {
         if shards == 0 || shards > MOST_SHARDS {
             return Err(Error::Parameter {
                 name: "shards",
                 found: shards.to_string(),
                 expected: format!("1 to {MOST_SHARDS}"),
+            });
+        }
+        if self.delivery.is_some() {
+            return Err(Error::Parameter {
+                name: "output",
+                found: self.output().display().to_string(),
+                expected: "a path: the finished mesh of a run that tasks share is sent to a store afterwards"
+                    .into(),
             });
         }
         if self.tiles.is_some() {
@@ -113,7 +112,17 @@ impl Reconstruction {
             // Its output cannot be changed later.
             known.fits(&self.params, &self.mesh, 1.0)?;
         }
-        let manifest = Manifest::of(self)?.to_bytes()?;
+        let manifest = Manifest::of(self)?;
+        if self.start != Start::New && place::is_at(&self.folder)? {
+            let begun = place::open(&self.folder, &self.copies)?;
+            if self.start == Start::Resume && !begun.is_left_over() {
+                let was = Manifest::from_bytes(&self.folder, &begun.manifest)?;
+                was.check(&manifest, &self.folder)?;
+                return Ok(&self.folder);
+            }
+            begun.remove();
+        }
+        let manifest = manifest.to_bytes()?;
         let random = std::hash::RandomState::new().build_hasher().finish();
         let sharing = Sharing {
             run: random,
@@ -122,7 +131,7 @@ impl Reconstruction {
             memory: self.memory.budget(),
             program: program()?,
         };
-        SharedFolder::create(&self.folder, manifest, sharing)?;
+        place::create(&self.folder, manifest, sharing)?;
         find::note(&self.mesh, &self.folder)?;
         Ok(&self.folder)
     }
@@ -133,14 +142,20 @@ impl Reconstruction {
     /// # Errors
     /// [`Error::NotResumable`], [`Error::Io`], [`Error::Corrupt`].
     pub fn shared(folder: impl AsRef<Path>) -> Result<Builder> {
-        let folder = SharedFolder::open(folder.as_ref())?;
-        let manifest = Manifest::from_bytes(&folder.path, &folder.manifest)?;
+        Self::shared_with(folder.as_ref(), Copies::default())
+    }
+
+    /// The same, with copies of what is in a store.
+    pub(crate) fn shared_with(folder: &Path, copies: Copies) -> Result<Builder> {
+        let path = folder.to_path_buf();
+        let folder = place::open(&path, &copies)?;
+        let manifest = Manifest::from_bytes(&path, &folder.manifest)?;
         if folder.is_left_over() {
             // There is nothing to do but to remove it.
-            return Ok(manifest.settings().folder(folder.path).threads(1));
+            return Ok(manifest.settings().folder(path).threads(1));
         }
         let plan = folder.sharing()?;
-        let builder = manifest.settings().folder(folder.path);
+        let builder = manifest.settings().folder(path).with_copies(copies);
         Ok(builder.threads(plan.threads as usize).memory(plan.memory))
     }
 
@@ -150,7 +165,7 @@ impl Reconstruction {
     /// Any [`Error`].
     pub fn work(&self, generation: Option<u64>, shard: u32) -> Result<Worked> {
         let begin = Instant::now();
-        let folder = SharedFolder::open(&self.folder)?;
+        let folder = place::open(&self.folder, &self.copies)?;
         let newest = folder.newest()?;
         let number = generation.unwrap_or(newest);
         if number < newest {
@@ -163,7 +178,8 @@ impl Reconstruction {
         // Whatever fails after a generation is over is no error.
         match outcome {
             Err(_) | Ok(Worked::Damaged(_)) if is_over(&folder, number) => Ok(Worked::Superseded),
-            outcome => outcome,
+            Ok(Worked::Damaged(e)) => Ok(Worked::Damaged(self.told(e, &folder))),
+            outcome => outcome.map_err(|e| self.told(e, &folder)),
         }
     }
 
@@ -182,7 +198,8 @@ impl Reconstruction {
                 expected: format!("0 to {}", now.sharing.shards - 1),
             });
         }
-        let opened = self.open_shared(|resources| folder.begin_task(now, shard, resources))?;
+        let task = |resources: &Resources<'_>| folder.begin_task(now, shard, resources);
+        let opened = self.open_shared(folder, task)?;
         let Ok(workspace) = opened else {
             return Ok(Worked::Done);
         };
@@ -211,7 +228,7 @@ impl Reconstruction {
     /// Any [`Error`].
     pub fn advance(&self) -> Result<Advanced> {
         let begin = Instant::now();
-        let folder = SharedFolder::open(&self.folder)?;
+        let folder = place::open(&self.folder, &self.copies)?;
         if folder.is_left_over() {
             find::forget(&self.mesh);
             folder.remove();
@@ -222,7 +239,8 @@ impl Reconstruction {
             Err(_) | Ok(Advanced::Damaged(_)) if is_over(&folder, number) => {
                 Ok(Advanced::Superseded)
             }
-            outcome => outcome,
+            Ok(Advanced::Damaged(e)) => Ok(Advanced::Damaged(self.told(e, &folder))),
+            outcome => outcome.map_err(|e| self.told(e, &folder)),
         }
     }
 
@@ -232,7 +250,7 @@ impl Reconstruction {
         let was = Manifest::from_bytes(&self.folder, &folder.manifest)?;
         was.check(&Manifest::of(self)?, &self.folder)?;
         let damaged = folder.is_damaged(&now)?;
-        let opened = self.open_shared(|resources| {
+        let opened = self.open_shared(folder, |resources| {
             let watched = (&*self.observer, &self.cancel);
             if damaged && let Some(run) = folder.begin_repair(&mut now, resources, watched)? {
                 return Ok(run);
@@ -319,12 +337,18 @@ impl Reconstruction {
         Ok(now)
     }
 
+    /// An error with the name that the user has for a file of the run.
+    fn told(&self, error: Error, folder: &SharedFolder) -> Error {
+        place::told(error, &self.folder, Some(&folder.path))
+    }
+
     fn open_shared(
         &self,
+        folder: &SharedFolder,
         begin: impl FnOnce(&Resources<'_>) -> Result<Opened>,
     ) -> Result<Result<Workspace, Opened>> {
         let opened = Workspace::shared(
-            &self.folder,
+            &folder.path,
             self.memory.clone(),
             self.threads,
             self.observer.clone(),
@@ -351,6 +375,7 @@ fn took(workspace: &Workspace, shard: Option<u32>, begin: Instant) -> Took {
         resident: limits::peak_resident(),
         read: workspace.io.read(),
         written: workspace.io.written(),
+        traffic: Traffic::default(),
         points: workspace.noted_points(),
         ended: SystemTime::now()
             .duration_since(SystemTime::UNIX_EPOCH)

@@ -6,6 +6,7 @@ use super::like::Like;
 use super::mesh_job::MeshJob;
 use super::resources::{Resources, resource_setters};
 use super::{Start, start::scratch_folder};
+use crate::deliver::{Delivery, Kind};
 use crate::params::Close;
 use crate::report::{Crossings, SimplifyReport};
 use crate::write::{Bounds, write};
@@ -23,6 +24,7 @@ use std::sync::Arc;
 const FORMAT: &str = "simplify 3";
 
 /// The making of a mesh with fewer triangles.
+#[derive(Clone)]
 pub struct Simplification {
     mesh: PathBuf,
     output: PathBuf,
@@ -82,13 +84,26 @@ impl Simplification {
     /// that makes no sense; [`Error::Memory`] if the budget is too small; [`Error::Io`], [`Error::Disk`],
     /// [`Error::Corrupt`], [`Error::Cancelled`]; those of an unfinished run, as of [`crate::Reconstruction::run`].
     pub fn run(&self) -> Result<SimplifyReport> {
+        let scratch = self.resources.scratch.as_deref();
+        match Delivery::of(&self.output, Kind::Mesh, scratch, None)? {
+            None => self.run_to(None),
+            Some(delivery) => {
+                let mut local = self.clone();
+                local.output = delivery.local().to_path_buf();
+                local.run_to(Some(&delivery))
+            }
+        }
+    }
+
+    fn run_to(&self, delivery: Option<&Delivery>) -> Result<SimplifyReport> {
         self.check()?;
         let job = MeshJob {
             format: FORMAT,
-            mesh: &self.mesh,
+            inputs: std::slice::from_ref(&self.mesh),
             output: &self.output,
             options: &(self.options.clone(), self.close),
             resources: &self.resources,
+            delivery,
         };
         let clean = || {
             if self.close.is_some() {

@@ -1,5 +1,7 @@
 //! The place of scratch files, and the treatment of an unfinished run.
 
+use super::shared::{below, is_store};
+use crate::deliver::{SCRATCH, scratch_name, scratch_of};
 use outcrop_mesh_files::export;
 use std::path::{Path, PathBuf};
 
@@ -17,15 +19,20 @@ pub enum Start {
 
 /// The scratch folder of a run with this output: beside it, or in the folder `parent`.
 pub(super) fn scratch_folder(output: &Path, parent: Option<&Path>) -> PathBuf {
+    if let Some(folder) = scratch_of(output, parent) {
+        return folder;
+    }
     let mut name = output.file_name().unwrap_or_default().to_os_string();
     let beside = export::folder_of(output);
     let Some(parent) = parent.filter(|parent| *parent != beside) else {
-        name.push(".outcrop-scratch");
+        name.push(SCRATCH);
         return beside.join(name);
     };
     // Outputs of the same name in several folders may share one folder for scratch.
     let whole = std::path::absolute(output).unwrap_or_else(|_| output.to_path_buf());
-    let bytes = outcrop_platform::path_bytes(&whole);
-    name.push(format!("-{:08x}.outcrop-scratch", crc32fast::hash(&bytes)));
-    parent.join(name)
+    let name = scratch_name(&name, &whole);
+    match is_store(parent) {
+        true => below(parent, &name),
+        false => parent.join(name),
+    }
 }

@@ -3,6 +3,7 @@
 use super::mesh_job::MeshJob;
 use super::resources::{Resources, resource_setters};
 use super::{Start, start::scratch_folder};
+use crate::deliver::{Delivery, Kind};
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::progress::{Cancel, Observer};
 use outcrop_disk::workspace::{Storage, Workspace};
@@ -14,6 +15,7 @@ use std::sync::Arc;
 const FORMAT: &str = "tiles 2";
 
 /// The making of a tileset.
+#[derive(Clone)]
 pub struct Tiles {
     mesh: PathBuf,
     folder: PathBuf,
@@ -54,13 +56,26 @@ impl Tiles {
     /// files; [`crate::Error::Memory`] if the budget is too small; [`crate::Error::Io`], [`crate::Error::Disk`], [`crate::Error::Corrupt`],
     /// [`crate::Error::Cancelled`]; those of an unfinished run, as of [`crate::Reconstruction::run`].
     pub fn run(&self) -> Result<TilesReport> {
+        let scratch = self.resources.scratch.as_deref();
+        match Delivery::of(&self.folder, Kind::Folder, scratch, None)? {
+            None => self.run_to(None),
+            Some(delivery) => {
+                let mut local = self.clone();
+                local.folder = delivery.local().to_path_buf();
+                local.run_to(Some(&delivery))
+            }
+        }
+    }
+
+    fn run_to(&self, delivery: Option<&Delivery>) -> Result<TilesReport> {
         outcrop_levels::check_folder(&self.folder)?;
         let job = MeshJob {
             format: FORMAT,
-            mesh: &self.mesh,
+            inputs: std::slice::from_ref(&self.mesh),
             output: &self.folder,
             options: &self.options,
             resources: &self.resources,
+            delivery,
         };
         job.run(
             |workspace| self.make(workspace),

@@ -59,12 +59,20 @@ pub fn open_folder(path: &Path) -> io::Result<File> {
     system::open_folder(path)
 }
 
+/// Syncs the names in a folder that [`open_folder`] opened.
+///
+/// # Errors
+/// Errors of the system.
+pub fn sync_names(folder: &File) -> io::Result<()> {
+    system::sync_names(folder)
+}
+
 /// Syncs the names in a folder.
 ///
 /// # Errors
 /// Errors of the system.
 pub fn sync_folder(path: &Path) -> io::Result<()> {
-    system::sync_folder(path)
+    sync_names(&open_folder(path)?)
 }
 
 /// Syncs all that is below a folder, files and names.
@@ -73,6 +81,15 @@ pub fn sync_folder(path: &Path) -> io::Result<()> {
 /// Errors of the system.
 pub fn sync_below(folder: &Path) -> io::Result<()> {
     system::sync_below(folder)
+}
+
+/// Gives a file or folder another name. A file that has the name is replaced. Another program that looks at one of
+/// them for a moment is waited for, where that is in the way.
+///
+/// # Errors
+/// Errors of the system.
+pub fn rename(from: &Path, to: &Path) -> io::Result<()> {
+    system::rename(from, to)
 }
 
 /// A number that two paths have in common if they are on the same disk.
@@ -114,9 +131,29 @@ pub fn populate(map: &Mmap) -> io::Result<()> {
     system::populate(map)
 }
 
+/// True for the error of a write to a pipe that nobody reads any more.
+#[must_use]
+pub fn is_broken_pipe(error: &io::Error) -> bool {
+    system::is_broken_pipe(error)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_file_takes_the_name_of_another() {
+        let folder = tempfile::tempdir().unwrap();
+        let [one, two] = ["one", "two"].map(|name| folder.path().join(name));
+        std::fs::write(&one, "new").unwrap();
+        std::fs::write(&two, "old").unwrap();
+        rename(&one, &two).unwrap();
+        assert_eq!(std::fs::read(&two).unwrap(), b"new");
+        assert_eq!(
+            rename(&one, &two).unwrap_err().kind(),
+            io::ErrorKind::NotFound
+        );
+    }
 
     #[test]
     fn parts_are_read_and_written_at_their_offsets() {

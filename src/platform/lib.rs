@@ -34,11 +34,16 @@ use windows as system;
 #[cfg(unix)]
 mod unix;
 
+/// For the systems whose shells leave wildcards to the programs.
+#[cfg(any(windows, test))]
+mod wildcards;
+
 #[cfg(not(any(target_os = "linux", target_os = "macos", windows)))]
 compile_error!("no file of src/platform is for this system");
 
 pub use files::{
     FileAt, device, disk_free, is_local, is_private, links, make_private_folder, modified,
-    open_folder, open_regular, populate, private_options, public_options, sync_below, sync_folder,
+    open_folder, open_regular, populate, private_options, public_options, rename, sync_below,
+    sync_folder, sync_names,
 };
-pub use names::{browser, path_bytes, path_of_bytes, program, quoted};
+pub use names::{browser, canonical, no_name, path_bytes, path_of_bytes, program, quoted};

@@ -4,9 +4,10 @@ mod heap;
 mod limits;
 
 pub use super::unix::{
-    DISK_FAILS, DISK_FULL, FileAt, cpu_seconds, device, disk_free, existing_options, freeze,
-    is_private, is_regular, kill, links, make_private_folder, modified, on_stop, open_folder,
-    path_bytes, path_of_bytes, private_options, public_options, quoted, sync_folder,
+    DISK_FAILS, DISK_FULL, FileAt, arguments, canonical, cpu_seconds, device, disk_free,
+    existing_options, freeze, is_broken_pipe, is_private, is_regular, kill, links,
+    make_private_folder, modified, no_name, on_stop, open_folder, path_bytes, path_of_bytes,
+    private_options, public_options, quoted, rename, sync_names,
 };
 pub use heap::{CAN_TRIM, trim};
 pub use limits::{memory_allowed, peak_resident, resident, resident_file};

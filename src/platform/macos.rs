@@ -4,13 +4,12 @@
     reason = "the memory of the machine and of the process cannot be asked for otherwise"
 )]
 
-pub use super::unix::disk_free;
 pub use super::unix::{
-    DISK_FAILS, DISK_FULL, FileAt, cpu_seconds, device, existing_options, freeze, is_private,
-    is_regular, kill, links, make_private_folder, modified, on_stop, open_folder, path_bytes,
-    path_of_bytes, private_options, public_options, quoted, sync_folder,
+    DISK_FAILS, DISK_FULL, FileAt, arguments, canonical, cpu_seconds, device, disk_free,
+    existing_options, freeze, is_broken_pipe, is_private, is_regular, kill, links,
+    make_private_folder, modified, no_name, on_stop, open_folder, path_bytes, path_of_bytes,
+    private_options, public_options, quoted, rename, sync_names,
 };
-
 use memmap2::{Advice, Mmap};
 use std::ffi::{c_int, c_void};
 use std::fs::File;
@@ -32,7 +31,7 @@ pub fn sync_below(folder: &Path) -> io::Result<()> {
             false => File::open(entry.path())?.sync_all()?,
         }
     }
-    sync_folder(folder)
+    crate::sync_folder(folder)
 }
 
 /// Bytes of a page, on either processor or smaller.

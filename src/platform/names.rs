@@ -1,6 +1,7 @@
 //! Paths as bytes and for a shell, and the paths of programs.
 
 use crate::system;
+use std::ffi::OsString;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -15,6 +16,26 @@ pub fn path_bytes(path: &Path) -> Vec<u8> {
 #[must_use]
 pub fn path_of_bytes(bytes: Vec<u8>) -> PathBuf {
     system::path_of_bytes(bytes)
+}
+
+/// The path of something that exists, whole and without links: for comparing, and fit to be shown.
+///
+/// # Errors
+/// Errors of the system.
+pub fn canonical(path: &Path) -> io::Result<PathBuf> {
+    system::canonical(path)
+}
+
+/// Why no file can have a name here; none if one can.
+#[must_use]
+pub fn no_name(name: &str) -> Option<&'static str> {
+    system::no_name(name)
+}
+
+/// The arguments of the program, with names of files in place of wildcards.
+#[must_use]
+pub fn arguments() -> Vec<OsString> {
+    system::arguments()
 }
 
 /// A path from which the program that runs can be read.

@@ -49,8 +49,16 @@ pub fn open_folder(path: &Path) -> io::Result<File> {
     File::open(path)
 }
 
-pub fn sync_folder(path: &Path) -> io::Result<()> {
-    File::open(path)?.sync_all()
+pub fn sync_names(folder: &File) -> io::Result<()> {
+    folder.sync_all()
+}
+
+pub fn rename(from: &Path, to: &Path) -> io::Result<()> {
+    std::fs::rename(from, to)
+}
+
+pub fn is_broken_pipe(error: &io::Error) -> bool {
+    error.kind() == io::ErrorKind::BrokenPipe
 }
 
 pub fn device(path: &Path) -> Option<u64> {
@@ -76,6 +84,20 @@ pub fn path_bytes(path: &Path) -> Vec<u8> {
 
 pub fn path_of_bytes(bytes: Vec<u8>) -> PathBuf {
     OsString::from_vec(bytes).into()
+}
+
+pub fn canonical(path: &Path) -> io::Result<PathBuf> {
+    path.canonicalize()
+}
+
+/// Any can.
+pub fn no_name(_: &str) -> Option<&'static str> {
+    None
+}
+
+/// The shell has replaced wildcards.
+pub fn arguments() -> Vec<OsString> {
+    std::env::args_os().collect()
 }
 
 pub fn quoted(text: &str) -> String {

@@ -1,24 +1,29 @@
 //! Windows 10 and later.
 
 mod access;
+mod names;
 mod process;
 mod volume;
 
 pub use access::{is_private, make_private_folder};
+pub use names::{arguments, canonical, no_name, path_bytes, path_of_bytes, quoted};
 pub use process::{
     CAN_TRIM, cpu_seconds, freeze, kill, memory_allowed, on_stop, open_many_files, peak_resident,
     resident, resident_file, trim,
 };
 pub use volume::{device, disk_free, is_local, links, populate};
 
-use std::ffi::OsString;
 use std::fs::{File, Metadata, OpenOptions};
 use std::io;
-use std::os::windows::ffi::{OsStrExt, OsStringExt};
+use std::os::windows::ffi::OsStrExt;
 use std::os::windows::fs::{FileExt, MetadataExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use windows_sys::Win32::Foundation::{ERROR_DISK_FULL, ERROR_IO_DEVICE};
+use std::time::Duration;
+use windows_sys::Win32::Foundation::{
+    ERROR_ACCESS_DENIED, ERROR_DISK_FULL, ERROR_INVALID_FUNCTION, ERROR_IO_DEVICE, ERROR_NO_DATA,
+    ERROR_PIPE_NOT_CONNECTED, ERROR_SHARING_VIOLATION,
+};
 use windows_sys::Win32::Storage::FileSystem::{
     FILE_ATTRIBUTE_REPARSE_POINT, FILE_FLAG_BACKUP_SEMANTICS, FILE_FLAG_OPEN_REPARSE_POINT,
 };
@@ -101,11 +106,12 @@ pub fn open_folder(path: &Path) -> io::Result<File> {
     options.custom_flags(FILE_FLAG_BACKUP_SEMANTICS).open(path)
 }
 
-/// File systems that keep a journal have the names in it, and some refuse to be asked.
-pub fn sync_folder(path: &Path) -> io::Result<()> {
-    match open_folder(path).and_then(|folder| folder.sync_all()) {
-        Err(error) if error.kind() != io::ErrorKind::PermissionDenied => Err(error),
-        _ => Ok(()),
+/// File systems that keep a journal have the names in it, and others refuse to be asked.
+pub fn sync_names(folder: &File) -> io::Result<()> {
+    let refused = [ERROR_ACCESS_DENIED, ERROR_INVALID_FUNCTION].map(u32::cast_signed);
+    match folder.sync_all() {
+        Err(e) if e.raw_os_error().is_some_and(|code| refused.contains(&code)) => Ok(()),
+        done => done,
     }
 }
 
@@ -118,7 +124,7 @@ pub fn sync_below(folder: &Path) -> io::Result<()> {
             false => File::options().write(true).open(entry.path())?.sync_all()?,
         }
     }
-    sync_folder(folder)
+    crate::sync_folder(folder)
 }
 
 /// Ticks of a ten-millionth of a second between the beginnings of 1601, from which the system counts, and of 1970.
@@ -130,16 +136,30 @@ pub fn modified(about: &Metadata) -> (i64, i64) {
     (ticks.div_euclid(second), ticks.rem_euclid(second) * 100)
 }
 
-/// The code units of UTF-16, two bytes each.
-pub fn path_bytes(path: &Path) -> Vec<u8> {
-    let units = path.as_os_str().encode_wide();
-    units.flat_map(u16::to_le_bytes).collect()
+/// Looks at a file that is in the way of a program that scans new files, and the time between them: half a second in
+/// all.
+const LOOKS: u32 = 25;
+const PAUSE: Duration = Duration::from_millis(20);
+
+/// Others that hold one of the files may let it go soon.
+pub fn rename(from: &Path, to: &Path) -> io::Result<()> {
+    let held = [ERROR_ACCESS_DENIED, ERROR_SHARING_VIOLATION].map(u32::cast_signed);
+    let is_held = |e: &io::Error| e.raw_os_error().is_some_and(|code| held.contains(&code));
+    for _ in 1..LOOKS {
+        match std::fs::rename(from, to) {
+            Err(error) if is_held(&error) => std::thread::sleep(PAUSE),
+            done => return done,
+        }
+    }
+    std::fs::rename(from, to)
 }
 
-pub fn path_of_bytes(bytes: Vec<u8>) -> PathBuf {
-    let (units, _) = bytes.as_chunks();
-    let units: Vec<u16> = units.iter().map(|unit| u16::from_le_bytes(*unit)).collect();
-    OsString::from_wide(&units).into()
+pub fn is_broken_pipe(error: &io::Error) -> bool {
+    let codes = [ERROR_NO_DATA, ERROR_PIPE_NOT_CONNECTED].map(u32::cast_signed);
+    error.kind() == io::ErrorKind::BrokenPipe
+        || error
+            .raw_os_error()
+            .is_some_and(|code| codes.contains(&code))
 }
 
 /// The path with a 0 at its end, absolute and in the form that is not limited to 260 characters.
@@ -169,15 +189,6 @@ pub fn program() -> io::Result<PathBuf> {
     std::env::current_exe()
 }
 
-/// For `cmd` and PowerShell; no name has quotes in it.
-pub fn quoted(text: &str) -> String {
-    let plain = |c: char| c.is_alphanumeric() || r"\/._-+:".contains(c);
-    match text.chars().all(plain) {
-        true => text.to_owned(),
-        false => format!("\"{text}\""),
-    }
-}
-
 pub fn browser(url: &str) -> Option<Command> {
     let mut command = Command::new("cmd");
     command.args(["/C", "start", ""]).arg(url);
@@ -203,9 +214,50 @@ mod tests {
     }
 
     #[test]
-    fn quotes_are_for_a_shell() {
-        assert_eq!(quoted(r"C:\a\b-c.ply"), r"C:\a\b-c.ply");
-        assert_eq!(quoted(r"C:\a b"), "\"C:\\a b\"");
-        assert_eq!(quoted("a&b"), "\"a&b\"");
+    fn a_rename_waits_for_whoever_holds_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let [new, old] = ["new", "old"].map(|name| folder.path().join(name));
+        std::fs::write(&new, "new").unwrap();
+        std::fs::write(&old, "old").unwrap();
+        let held = File::open(&old).unwrap();
+        let holder = std::thread::spawn(move || {
+            std::thread::sleep(5 * PAUSE);
+            drop(held);
+        });
+        rename(&new, &old).unwrap();
+        holder.join().unwrap();
+        assert_eq!(std::fs::read(&old).unwrap(), b"new");
+    }
+
+    /// Disks that have the semantics of POSIX replace it, and others refuse.
+    #[test]
+    fn a_file_that_is_held_longer_stays_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let [new, old] = ["new", "old"].map(|name| folder.path().join(name));
+        std::fs::write(&new, "new").unwrap();
+        std::fs::write(&old, "old").unwrap();
+        let held = File::open(&old).unwrap();
+        let renamed = rename(&new, &old);
+        drop(held);
+        let (there, content) = (new.exists(), std::fs::read(&old).unwrap());
+        match renamed {
+            Ok(()) => assert!(!there && content == b"new"),
+            Err(_) => assert!(there && content == b"old"),
+        }
+    }
+
+    #[test]
+    fn paths_longer_than_260_characters() {
+        let folder = tempfile::tempdir().unwrap();
+        let deep = folder.path().join("x".repeat(100)).join("y".repeat(200));
+        std::fs::create_dir_all(&deep).unwrap();
+        let [one, two] = ["one", "two"].map(|name| deep.join(name));
+        std::fs::write(&one, "content").unwrap();
+        rename(&one, &two).unwrap();
+        assert!(device(&two).is_some() && disk_free(&deep).is_some() && is_local(&two));
+        assert_eq!(links(&two), Some(1));
+        let private = deep.join("private");
+        make_private_folder(&private).unwrap();
+        assert!(is_private(&private, &private.symlink_metadata().unwrap()).unwrap());
     }
 }

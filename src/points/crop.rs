@@ -1,9 +1,9 @@
 //! Selection of points by position: those in a region or within a margin around it.
 
 use super::native::Native;
+use super::reads::Means;
 use super::source::Source;
 use outcrop_disk::error::{Error, Result};
-use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::memory::Reservation;
 use outcrop_geom::boxes::BoxTree;
 use outcrop_geom::region::{Area, Region};
@@ -51,9 +51,9 @@ pub(super) struct Nearby<'a> {
 }
 
 impl<'a> Nearby<'a> {
-    pub(super) fn of(crop: &'a Crop, workspace: &Workspace) -> Result<Self> {
+    pub(super) fn of(crop: &'a Crop, means: Means<'_>) -> Result<Self> {
         Ok(Self {
-            _held: workspace.reserve("crop: outline", crop.region.area_bytes())?,
+            _held: means.reserve("crop: outline", crop.region.area_bytes())?,
             area: crop.region.area(),
             margin: crop.margin,
         })

@@ -104,6 +104,16 @@ impl Input {
         !matches!(self.source, Source::File(_))
     }
 
+    /// True if any part of it can be read: more than the beginning of a compressed file, and of one on a server that
+    /// sends parts.
+    pub(super) fn is_at_hand(&self) -> bool {
+        match &self.source {
+            Source::File(_) | Source::Content(..) => true,
+            Source::Memory(bytes) => bytes.len() as u64 == self.bytes,
+            Source::Remote(remote) => remote.has_parts(),
+        }
+    }
+
     fn of(path: &Path, io: Arc<IoCounters>) -> Result<Self> {
         let file = File::open(path).map_err(|e| Error::io(path, "open", e))?;
         let meta = file

@@ -8,6 +8,7 @@ use super::format::Format;
 use super::input::Input;
 use super::layout::Layout;
 use super::native::Native;
+use super::reads::{Means, Reads};
 use super::spool::SourceWriter;
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::Workspace;
@@ -147,6 +148,22 @@ pub(super) trait PointFile {
         _workspace: &Workspace,
     ) -> Option<[[f64; 3]; 2]> {
         None
+    }
+
+    /// What a run reads of the file, which has all points if none is selected by `nearby`. Samples of points, by which
+    /// a run checks what a header says, are not made.
+    ///
+    /// # Errors
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Memory`],
+    /// [`outcrop_disk::error::Error::Cancelled`]; [`outcrop_disk::error::Error::Input`] for a hierarchy that a run
+    /// refuses.
+    fn reads(
+        &self,
+        input: &Input,
+        _nearby: Option<&Nearby<'_>>,
+        _means: Means<'_>,
+    ) -> Result<Reads> {
+        Ok(Reads::whole(input, self.claims(input).likely_points))
     }
 
     /// True if [`PointFile::read`] says itself which parts of the file it will read, with [`Input::expect`].

@@ -2,13 +2,17 @@
 
 use super::Opened;
 use super::columns::{Attributes, Column, normal_columns};
+use super::crop::{Crop, Nearby};
 use super::format::Format;
 use super::formats::{LONG_HEAD, is_cloud};
 use super::input::Input;
 use super::layout::Layout;
 use super::native::Native;
+use super::reads::{Means, Reads};
 use super::remote::Fetched;
 use outcrop_disk::error::Result;
+use outcrop_disk::workspace::memory::MemoryPool;
+use outcrop_disk::workspace::progress::Cancel;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -23,6 +27,8 @@ pub struct Probe {
     pub bytes: u64,
     /// What was asked of the server, if it is on one.
     pub fetched: Option<Fetched>,
+    /// What a run reads of it; none if nobody asked.
+    pub reads: Option<Reads>,
     /// Estimated bytes of its content if it is compressed, else 0.
     pub decompressed_bytes: u64,
     /// Number of points given in the header; `None` for text.
@@ -75,6 +81,29 @@ pub fn probe(path: &Path) -> Result<Probe> {
 /// See [`probe`].
 pub fn probe_as(path: &Path, layout: &Layout) -> Result<Probe> {
     let opened = Opened::new(Input::open_head(path, &is_cloud, LONG_HEAD)?, layout)?;
+    Ok(probed(opened, None))
+}
+
+/// As [`probe_as`]; also tells what a run reads of the file, all of it or what lies in a region. A hierarchy of nodes is
+/// read for that, with a reservation of memory.
+///
+/// # Errors
+/// See [`probe`]; [`outcrop_disk::error::Error::Memory`], [`outcrop_disk::error::Error::Cancelled`].
+pub fn probe_near(
+    path: &Path,
+    layout: &Layout,
+    crop: Option<&Crop>,
+    memory: &MemoryPool,
+    cancel: &Cancel,
+) -> Result<Probe> {
+    let means = Means { memory, cancel };
+    let opened = Opened::new(Input::open_head(path, &is_cloud, LONG_HEAD)?, layout)?;
+    let nearby = crop.map(|crop| Nearby::of(crop, means)).transpose()?;
+    let reads = opened.file.reads(&opened.input, nearby.as_ref(), means)?;
+    Ok(probed(opened, Some(reads)))
+}
+
+fn probed(opened: Opened, reads: Option<Reads>) -> Probe {
     let has_scanners = opened.has_scanners();
     let Opened {
         input,
@@ -92,10 +121,11 @@ pub fn probe_as(path: &Path, layout: &Layout) -> Result<Probe> {
         .flatten()
         .map(|n| columns[n].scalar.bytes());
     let normal_bytes = bytes.sum::<usize>() as u64;
-    Ok(Probe {
+    Probe {
         format: claims.format,
         bytes: input.size,
         fetched: input.fetched(),
+        reads,
         decompressed_bytes: if input.is_compressed() {
             input.bytes
         } else {
@@ -117,5 +147,5 @@ pub fn probe_as(path: &Path, layout: &Layout) -> Result<Probe> {
         normal_bytes,
         spool_bytes_per_point: claims.native.point_bytes() as u64,
         path: input.path,
-    })
+    }
 }

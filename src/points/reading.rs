@@ -6,6 +6,7 @@ use super::crop::Nearby;
 use super::frames::Frame;
 use super::input::Input;
 use super::point_format::{Claims, PointFile};
+use super::reads::Means;
 use super::source::Source;
 use super::spool::SourceWriter;
 use super::stats::{FileStats, IngestStats};
@@ -28,7 +29,7 @@ pub(super) fn read_all(
 ) -> Result<Spool> {
     let classes = &selection.classes;
     let crop = selection.crop.as_ref();
-    let nearby = crop.map(|crop| Nearby::of(crop, workspace));
+    let nearby = crop.map(|crop| Nearby::of(crop, Means::of(workspace)));
     let nearby = nearby.transpose()?;
     let (mut section, mut frames, mut values) = (0, Vec::new(), Vec::new());
     let mut sources = Vec::new();

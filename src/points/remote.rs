@@ -29,7 +29,7 @@ pub struct Fetched {
 }
 
 /// What tells one version of a remote file from another.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Version {
     /// Size in bytes.
     pub bytes: u64,

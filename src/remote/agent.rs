@@ -1,8 +1,9 @@
 //! The HTTP client that the stores use: requests block, answers are read as they arrive, all are counted.
 
 use bytes::{Bytes, BytesMut};
-use http::header::RETRY_AFTER;
-use http::{Request, Response};
+use chrono::DateTime;
+use http::header::{AGE, DATE, RETRY_AFTER};
+use http::{HeaderMap, Request, Response, StatusCode};
 use http_body::{Body, Frame};
 use http_body_util::BodyExt;
 use object_store::ClientOptions;
@@ -12,10 +13,10 @@ use object_store::client::{
 };
 use std::io::{ErrorKind, Read};
 use std::pin::Pin;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::task::{Context, Poll};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use ureq::Agent;
 use ureq::tls::{Certificate, RootCerts, TlsConfig};
 
@@ -34,11 +35,13 @@ const LONGEST_WAIT: u64 = 60;
 /// Redirections that are followed where no credentials are sent.
 const REDIRECTIONS: u32 = 5;
 
-/// Requests made, and bytes of their answers.
+/// Requests made, bytes of their answers, and the time at the server.
 #[derive(Debug, Default)]
 pub struct Counts {
     requests: AtomicU64,
     bytes: AtomicU64,
+    /// Seconds since 1970; 0 if no answer told it.
+    clock: AtomicI64,
 }
 
 impl Counts {
@@ -53,20 +56,98 @@ impl Counts {
     pub fn bytes(&self) -> u64 {
         self.bytes.load(Ordering::Relaxed)
     }
+
+    /// The latest time that an answer told, in seconds since 1970; none if none did.
+    #[must_use]
+    pub fn clock(&self) -> Option<i64> {
+        Some(self.clock.load(Ordering::Relaxed)).filter(|time| *time > 0)
+    }
+
+    /// Notes when an answer was given: a cache between tells the time of its own copy, and how old that is.
+    fn note_time(&self, headers: &HeaderMap) {
+        let text = |name| headers.get(name).and_then(|value| value.to_str().ok());
+        let date = text(DATE).and_then(|date| DateTime::parse_from_rfc2822(date).ok());
+        let age = text(AGE).and_then(|age| age.trim().parse().ok());
+        if let Some(date) = date {
+            let time = date.timestamp().saturating_add(age.unwrap_or(0));
+            self.clock.fetch_max(time, Ordering::Relaxed);
+        }
+    }
+}
+
+/// What a client does about failures.
+#[derive(Debug, Default)]
+pub(crate) struct Temper {
+    /// True if an unknown host is taken for an outage.
+    patient: AtomicBool,
+    /// When a client that is not patient gives up, whatever its store would repeat.
+    until: Option<Instant>,
+}
+
+impl Temper {
+    /// Repeats as long as the store does.
+    pub(crate) fn new(patient: bool) -> Self {
+        Self {
+            patient: patient.into(),
+            until: None,
+        }
+    }
+
+    /// Gives up after `time`, until it becomes patient.
+    pub(crate) fn hasty(time: Duration) -> Self {
+        Self {
+            patient: false.into(),
+            until: Instant::now().checked_add(time),
+        }
+    }
+
+    /// From now on it is patient.
+    pub(crate) fn calm(&self) {
+        self.patient.store(true, Ordering::Relaxed);
+    }
+
+    fn is_patient(&self) -> bool {
+        self.patient.load(Ordering::Relaxed)
+    }
+
+    fn gives_up(&self) -> bool {
+        !self.is_patient() && self.until.is_some_and(|until| Instant::now() >= until)
+    }
+}
+
+/// The status of an answer that is not asked for again.
+#[derive(Debug)]
+struct Refused(StatusCode);
+
+impl std::fmt::Display for Refused {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+impl std::error::Error for Refused {}
+
+/// True for a status that stores take for an outage.
+fn is_outage(status: StatusCode) -> bool {
+    status.is_server_error() || matches!(status.as_u16(), 408 | 429)
 }
 
 /// Makes the client of a store.
 #[derive(Debug, Clone)]
 pub(crate) struct Connector {
     agent: Agent,
-    patient: bool,
+    temper: Arc<Temper>,
     counts: Arc<Counts>,
 }
 
 impl Connector {
-    /// A client; `secure` permits no request without TLS, `follows` follows redirections, and a `patient` one
-    /// takes an unknown host for an outage.
-    pub(crate) fn new(secure: bool, follows: bool, patient: bool, counts: Arc<Counts>) -> Self {
+    /// A client; `secure` permits no request without TLS, `follows` follows redirections.
+    pub(crate) fn new(
+        secure: bool,
+        follows: bool,
+        temper: Arc<Temper>,
+        counts: Arc<Counts>,
+    ) -> Self {
         let config = Agent::config_builder()
             .http_status_as_error(false)
             .https_only(secure)
@@ -80,7 +161,7 @@ impl Connector {
             .build();
         Self {
             agent: config.new_agent(),
-            patient,
+            temper,
             counts,
         }
     }
@@ -115,7 +196,17 @@ impl HttpService for Connector {
             true => self.agent.run(Request::from_parts(head, ())),
             false => self.agent.run(Request::from_parts(head, &body[..])),
         };
-        let answer = answer.map_err(|e| failed(e, self.patient))?;
+        let answer = answer.map_err(|e| match self.temper.gives_up() {
+            true => HttpError::new(HttpErrorKind::Unknown, e),
+            false => failed(e, self.temper.is_patient()),
+        })?;
+        self.counts.note_time(answer.headers());
+        if is_outage(answer.status()) && self.temper.gives_up() {
+            return Err(HttpError::new(
+                HttpErrorKind::Unknown,
+                Refused(answer.status()),
+            ));
+        }
         wait_as_asked(&answer);
         let (head, body) = answer.into_parts();
         let body = Reading {

@@ -11,7 +11,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
 /// Most bytes of a piece: at 100 MB/s a request of it takes 40 ms, of which 10 are spent waiting.
-const PIECE: u64 = 4 << 20;
+pub(crate) const PIECE: u64 = 4 << 20;
 
 /// Ranges with a smaller gap between them are one request.
 const GAP: u64 = 16 << 10;

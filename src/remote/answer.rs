@@ -1,10 +1,13 @@
 //! Answers as they arrive.
 
+use super::ahead::PIECE;
 use super::errors::{changed, told};
 use super::wait::wait;
 use bytes::Bytes;
 use futures_util::StreamExt;
 use futures_util::stream::BoxStream;
+use http_body_util::BodyStream;
+use object_store::client::HttpResponseBody;
 use object_store::{Error, GetResult, Result};
 use std::io::{self, ErrorKind};
 
@@ -16,6 +19,19 @@ impl Answer {
         Self(got.into_stream())
     }
 
+    /// The answer to a request of our own.
+    pub(crate) fn of_body(body: HttpResponseBody) -> Self {
+        let frames = BodyStream::new(body).filter_map(async |frame| {
+            let data = frame.map(|frame| frame.into_data().ok());
+            let failed = |source| Error::Generic {
+                store: "server",
+                source: Box::new(source),
+            };
+            data.map_err(failed).transpose()
+        });
+        Self(frames.boxed())
+    }
+
     /// The next bytes; none at the end. [`ErrorKind::UnexpectedEof`] if the answer breaks off.
     pub(crate) fn next(&mut self) -> io::Result<Option<Bytes>> {
         wait(self.0.next())?.transpose().map_err(broken)
@@ -24,7 +40,8 @@ impl Answer {
     /// The first `wanted` bytes, of which there must be as many.
     pub(crate) fn take(mut self, wanted: u64) -> io::Result<Bytes> {
         let wanted = usize::try_from(wanted).map_err(io::Error::other)?;
-        let mut all = Vec::new();
+        // Large enough for a piece, so that it need not be copied while it grows.
+        let mut all = Vec::with_capacity(wanted.min(PIECE as usize));
         while all.len() < wanted {
             let part = self.next()?.ok_or_else(|| {
                 let why = format!("the answer ended after {} of {wanted} bytes", all.len());

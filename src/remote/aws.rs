@@ -1,19 +1,12 @@
-//! What the tools of AWS have beside the environment: profiles in files, and a look for the machine's own role.
+//! What the tools of AWS have beside the environment: profiles in files.
 
+use super::metadata::has_metadata;
 use object_store::aws::{AmazonS3Builder, AmazonS3ConfigKey};
 use std::collections::BTreeMap;
-use std::net::{SocketAddr, TcpStream};
 use std::path::PathBuf;
-use std::time::Duration;
 
 /// Settings of a profile, by their names in the files.
 type Profile = BTreeMap<String, String>;
-
-/// The address at which a machine in the cloud asks for its role.
-const METADATA: ([u8; 4], u16) = ([169, 254, 169, 254], 80);
-
-/// How long that address may take to accept a connection: it is on the same machine.
-const NEAR: Duration = Duration::from_millis(300);
 
 /// The least bytes of the files that are read.
 const LONGEST: u64 = 1 << 20;
@@ -53,12 +46,6 @@ pub(crate) fn builder() -> AmazonS3Builder {
         return builder;
     }
     builder.with_skip_signature(true)
-}
-
-/// True if this machine has a role that it can ask for.
-pub(crate) fn has_metadata() -> bool {
-    let disabled = std::env::var("AWS_EC2_METADATA_DISABLED").is_ok_and(|v| v == "true");
-    !disabled && TcpStream::connect_timeout(&SocketAddr::from(METADATA), NEAR).is_ok()
 }
 
 fn set(name: &str) -> bool {

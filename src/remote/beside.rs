@@ -2,8 +2,8 @@
 
 use super::ahead::Ahead;
 use super::answer::Answer;
-use super::errors::told;
-use super::object::{Object, again, ask};
+use super::errors::{newer, told};
+use super::object::{Object, Version, again, ask};
 use super::stores::Place;
 use bytes::Bytes;
 use object_store::path::Path;
@@ -25,29 +25,37 @@ impl Beside {
         Ok(Self((store.clone(), folder.map_err(|e| told(e.into()))?)))
     }
 
-    /// The bytes of the file `name`, which may have slashes; at most `most`.
+    /// The bytes of the file `name`, which may have slashes; at most `most`. And its version.
     ///
     /// # Errors
     /// [`io::ErrorKind::NotFound`]; [`io::ErrorKind::InvalidData`] for a larger file; as [`super::Object::open`].
-    pub fn read(&self, name: &str, most: u64) -> io::Result<Bytes> {
+    pub fn read(&self, name: &str, most: u64) -> io::Result<(Bytes, Version)> {
         let (store, folder) = &self.0;
         let path = match folder.as_ref() {
             "" => Path::parse(name),
             folder => Path::parse(format!("{folder}/{name}")),
         };
         let file = (store.clone(), path.map_err(|e| told(e.into()))?);
-        again(|| Answer::of(ask(&file, None, None)?).all(most))
+        again(|| {
+            let got = ask(&file, None, None)?;
+            let version = Version::of(&got.meta);
+            Ok((Answer::of(got).all(most)?, version))
+        })
     }
 
     /// Files that will be read in this order, each with the most bytes that it may have: fetched before, as long as
-    /// they hold at most `bytes`.
+    /// they hold at most `bytes`. A file that has changed after `begun`, in seconds since 1970, is an error.
     #[must_use]
-    pub fn expect(&self, files: Vec<(String, u64)>, bytes: u64) -> Expected {
+    pub fn expect(&self, files: Vec<(String, u64)>, bytes: u64, begun: Option<i64>) -> Expected {
         let sizes: Vec<u64> = files.iter().map(|(_, most)| *most).collect();
         let beside = self.clone();
         let fetch = move |file: usize| {
             let (name, most) = &files[file];
-            beside.read(name, *most)
+            let (bytes, version) = beside.read(name, *most)?;
+            match begun.is_some_and(|begun| version.modified.0 > begun) {
+                true => Err(newer()),
+                false => Ok(bytes),
+            }
         };
         Expected(Ahead::of_files(sizes, bytes, fetch))
     }

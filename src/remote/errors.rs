@@ -12,6 +12,14 @@ pub(crate) fn changed() -> io::Error {
     )
 }
 
+/// The error of a file that is newer than the run that reads it.
+pub(crate) fn newer() -> io::Error {
+    io::Error::new(
+        ErrorKind::InvalidData,
+        "the file has changed on the server since the run began",
+    )
+}
+
 /// An error of a store in one line, of the kind that a local file would give.
 pub(crate) fn told(error: Error) -> io::Error {
     let kind = match &error {

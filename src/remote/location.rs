@@ -1,7 +1,8 @@
 //! The name of a remote file.
 
+use object_store::path::Path as StorePath;
 use std::io::{Error, ErrorKind, Result};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use url::Url;
 
 /// Parts of the names of query parameters that give access to whoever has them.
@@ -44,6 +45,19 @@ impl Location {
         Ok(Self { url })
     }
 
+    /// A URL without what may be secret in it, for the message that refuses it.
+    #[must_use]
+    pub fn masked(path: &Path) -> PathBuf {
+        let text = path.to_string_lossy();
+        let plain = text.split(['?', '#']).next().unwrap_or_default();
+        let Some((scheme, rest)) = plain.split_once("://") else {
+            return plain.into();
+        };
+        let (host, file) = rest.split_at(rest.find('/').unwrap_or(rest.len()));
+        let host = host.rsplit('@').next().unwrap_or_default();
+        format!("{scheme}://{host}{file}").into()
+    }
+
     /// True for a prefix: a bucket, or a URL that ends with a slash.
     #[must_use]
     pub fn is_prefix(&self) -> bool {
@@ -54,6 +68,34 @@ impl Location {
     #[must_use]
     pub fn is_web(&self) -> bool {
         self.url.scheme().starts_with("http")
+    }
+
+    /// Its path in the store.
+    pub(crate) fn path(&self) -> object_store::Result<StorePath> {
+        StorePath::from_url_path(self.url.path().trim_start_matches('/'))
+            .map_err(|source| object_store::Error::InvalidPath { source })
+    }
+
+    /// The location of a file below this one, which is a folder: `name` may have slashes.
+    #[must_use]
+    pub fn below(&self, name: &str) -> Self {
+        let mut url = self.url.clone();
+        if let Ok(mut path) = url.path_segments_mut() {
+            path.pop_if_empty().extend(name.split('/'));
+        }
+        Self { url }
+    }
+
+    /// The folder in which the file lies, and its name as text; none for a prefix.
+    #[must_use]
+    pub fn parted(&self) -> Option<(Self, String)> {
+        let name = self.path().ok()?.filename()?.to_owned();
+        if self.is_prefix() {
+            return None;
+        }
+        let mut url = self.url.clone();
+        url.path_segments_mut().ok()?.pop();
+        Some((Self { url }, name))
     }
 
     /// The location of another file in the same folder, or of one that is named from there.
@@ -89,6 +131,10 @@ mod tests {
         ] {
             let error = Location::of(Path::new(url)).unwrap_err().to_string();
             assert!(!error.contains("hush"), "{error}");
+            assert_eq!(
+                Location::masked(Path::new(url)),
+                Path::new("https://host/a.laz")
+            );
         }
         assert!(Location::of(Path::new("https://host/a.laz?download=1")).is_ok());
         assert!(Location::of(Path::new("s3:///a.laz")).is_err());

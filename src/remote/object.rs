@@ -5,10 +5,10 @@ use super::ahead::Ahead;
 use super::answer::Answer;
 use super::errors::{changed, told};
 use super::location::Location;
-use super::stores::{Patience, Place, place};
+use super::stores::{Patience, Place, place_of_new};
 use super::wait::wait;
 use bytes::Bytes;
-use object_store::{GetOptions, GetRange, GetResult, ObjectStore};
+use object_store::{GetOptions, GetRange, GetResult, ObjectMeta, ObjectStore};
 use std::io::{self, ErrorKind};
 use std::ops::Range;
 use std::sync::{Arc, PoisonError, RwLock};
@@ -32,16 +32,33 @@ pub struct Object {
     ahead: RwLock<Option<Ahead>>,
 }
 
+/// What tells one version of a file from another.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Version {
+    /// Size in bytes.
+    pub bytes: u64,
+    /// The entity tag, which changes with the content; none if the server says none.
+    pub tag: Option<String>,
+    /// Seconds since 1970 and nanoseconds of the last change.
+    pub modified: (i64, u32),
+}
+
+impl Version {
+    pub(crate) fn of(meta: &ObjectMeta) -> Self {
+        let time = meta.last_modified;
+        Self {
+            bytes: meta.size,
+            tag: meta.e_tag.clone(),
+            modified: (time.timestamp(), time.timestamp_subsec_nanos()),
+        }
+    }
+}
+
 /// What a request for a part of the file needs.
 #[derive(Debug)]
 pub(crate) struct Remote {
     pub(crate) place: Place,
-    /// Size in bytes.
-    size: u64,
-    /// What changes with the content, if the server says it.
-    tag: Option<String>,
-    /// Seconds since 1970 of the last change, and nanoseconds.
-    modified: (i64, u32),
+    version: Version,
     counts: Arc<Counts>,
     has_parts: bool,
 }
@@ -53,24 +70,20 @@ impl Object {
     /// [`ErrorKind::NotFound`], [`ErrorKind::PermissionDenied`]; anything else that ends a request, after
     /// some seconds.
     pub fn open(location: &Location, counts: &Arc<Counts>) -> io::Result<Self> {
-        let first = place(location, Patience::Short, counts).map_err(told)?;
-        let (got, has_parts) = match ask(&first, Some(0..HEAD), None) {
+        let (place, temper) = place_of_new(location, counts).map_err(told)?;
+        let (got, has_parts) = match ask(&place, Some(0..HEAD), None) {
             Ok(got) => (got, true),
             // The server has no ranges, or nothing is in the file.
-            Err(e) if e.kind() == ErrorKind::Unsupported => (ask(&first, None, None)?, false),
+            Err(e) if e.kind() == ErrorKind::Unsupported => (ask(&place, None, None)?, false),
             Err(e) => return Err(e),
         };
-        let meta = got.meta.clone();
-        let kept = meta.size.min(if has_parts { HEAD } else { LONG_HEAD });
+        let version = Version::of(&got.meta);
+        let kept = version.bytes.min(if has_parts { HEAD } else { LONG_HEAD });
         let head = Answer::of(got).take(kept)?;
+        temper.calm();
         let file = Remote {
-            place: place(location, Patience::Long, counts).map_err(told)?,
-            size: meta.size,
-            tag: meta.e_tag,
-            modified: (
-                meta.last_modified.timestamp(),
-                meta.last_modified.timestamp_subsec_nanos(),
-            ),
+            place,
+            version,
             counts: counts.clone(),
             has_parts,
         };
@@ -84,7 +97,7 @@ impl Object {
     /// Size in bytes.
     #[must_use]
     pub fn size(&self) -> u64 {
-        self.file.size
+        self.file.version.bytes
     }
 
     /// True if the server sends parts of the file. Else only [`super::Whole`] reads it, and [`Self::read_at`] its
@@ -94,16 +107,10 @@ impl Object {
         self.file.has_parts
     }
 
-    /// The entity tag, which changes with the content; none if the server says none.
+    /// Its version when it was opened.
     #[must_use]
-    pub fn tag(&self) -> Option<&str> {
-        self.file.tag.as_deref()
-    }
-
-    /// Seconds since 1970 and nanoseconds of the last change.
-    #[must_use]
-    pub fn modified(&self) -> (i64, u32) {
-        self.file.modified
+    pub fn version(&self) -> &Version {
+        &self.file.version
     }
 
     /// Requests and bytes so far.
@@ -175,9 +182,10 @@ impl Remote {
 
     fn ask(&self, range: Option<Range<u64>>) -> io::Result<GetResult> {
         // A weak tag is of no use for this.
-        let tag = self.tag.clone().filter(|tag| !tag.starts_with("W/"));
-        let got = ask(&self.place, range, tag)?;
-        match (got.meta.size, &got.meta.e_tag) == (self.size, &self.tag) {
+        let Version { bytes, tag, .. } = &self.version;
+        let usable = tag.clone().filter(|tag| !tag.starts_with("W/"));
+        let got = ask(&self.place, range, usable)?;
+        match (got.meta.size, &got.meta.e_tag) == (*bytes, tag) {
             true => Ok(got),
             false => Err(changed()),
         }
@@ -185,7 +193,7 @@ impl Remote {
 }
 
 /// Repeats a request whose answer breaks off.
-pub(crate) fn again(mut once: impl FnMut() -> io::Result<Bytes>) -> io::Result<Bytes> {
+pub(crate) fn again<T>(mut once: impl FnMut() -> io::Result<T>) -> io::Result<T> {
     let begun = Instant::now();
     loop {
         match once() {

@@ -1,15 +1,17 @@
 //! The store that has a file, with the credentials that the store's own tools would use.
 
-use super::agent::{Connector, Counts};
+use super::agent::{Connector, Counts, Temper};
 use super::aws;
 use super::location::Location;
-use object_store::aws::AmazonS3ConfigKey;
-use object_store::azure::{AzureConfigKey, MicrosoftAzureBuilder};
-use object_store::gcp::{GoogleCloudStorageBuilder, GoogleConfigKey};
-use object_store::http::HttpBuilder;
+use super::metadata::has_metadata;
+use object_store::aws::{AmazonS3, AmazonS3ConfigKey};
+use object_store::azure::{AzureConfigKey, MicrosoftAzure, MicrosoftAzureBuilder};
+use object_store::gcp::{GoogleCloudStorage, GoogleCloudStorageBuilder, GoogleConfigKey};
+use object_store::http::{HttpBuilder, HttpStore};
 use object_store::path::Path;
-use object_store::{BackoffConfig, Error, ObjectStore, Result, RetryConfig};
-use std::sync::Arc;
+use object_store::{BackoffConfig, ObjectStore, Result, RetryConfig};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 /// Outages of this length are survived while points are read.
@@ -20,6 +22,9 @@ const IMPATIENCE: Duration = Duration::from_secs(15);
 
 /// Waits between requests that fail grow up to this.
 const LONGEST_PAUSE: Duration = Duration::from_secs(10);
+
+/// Where Google's store is.
+const GOOGLE: &str = "https://storage.googleapis.com";
 
 /// How long a request is repeated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,45 +65,80 @@ pub(crate) fn place(
     patience: Patience,
     counts: &Arc<Counts>,
 ) -> Result<Place> {
-    let url = &location.url;
-    let path = Path::from_url_path(url.path().trim_start_matches('/'))
-        .map_err(|source| Error::InvalidPath { source })?;
-    let door = Door { patience, counts };
-    let store = match url.scheme() {
-        "http" | "https" => door.web(location)?,
-        "s3" | "s3a" => door.amazon(location)?,
-        "gs" => door.google(location)?,
-        _ => door.azure(location)?,
+    Door::new(patience, counts).place(location)
+}
+
+/// The place of a file that is opened: requests end soon until the client is told to be calm, by which time the file is
+/// known to be there.
+pub(crate) fn place_of_new(
+    location: &Location,
+    counts: &Arc<Counts>,
+) -> Result<(Place, Arc<Temper>)> {
+    let temper = Arc::new(Temper::hasty(IMPATIENCE));
+    let door = Door {
+        patience: Patience::Long,
+        temper: temper.clone(),
+        counts,
     };
-    Ok((store, path))
+    Ok((door.place(location)?, temper))
+}
+
+impl<'a> Door<'a> {
+    pub(crate) fn new(patience: Patience, counts: &'a Arc<Counts>) -> Self {
+        Self {
+            patience,
+            temper: Arc::new(Temper::new(patience == Patience::Long)),
+            counts,
+        }
+    }
+
+    fn place(&self, location: &Location) -> Result<Place> {
+        let store: Arc<dyn ObjectStore> = match location.url.scheme() {
+            "http" | "https" => Arc::new(self.web(location)?),
+            "s3" | "s3a" => Arc::new(self.amazon(location)?),
+            "gs" => Arc::new(self.google(location)?.0),
+            _ => Arc::new(self.azure(location)?),
+        };
+        Ok((store, location.path()?))
+    }
 }
 
 /// What all stores are made with.
-struct Door<'a> {
+pub(crate) struct Door<'a> {
     patience: Patience,
+    temper: Arc<Temper>,
     counts: &'a Arc<Counts>,
+}
+
+/// The end of the builders of all stores, which have no type in common: the client, whose addresses start with `$address`.
+macro_rules! built {
+    ($door:expr, $location:expr, $builder:expr, $address:expr) => {
+        $builder
+            .with_http_connector($door.client($address, false))
+            .with_retry($door.patience.retries())
+            .with_url($location.url.as_str())
+            .build()
+    };
 }
 
 impl Door<'_> {
     /// The client of a store whose address starts with `address`.
-    fn client(&self, address: &str, follows: bool) -> Connector {
+    pub(crate) fn client(&self, address: &str, follows: bool) -> Connector {
         let secure = !address.starts_with("http://");
-        let patient = self.patience == Patience::Long;
-        Connector::new(secure, follows, patient, self.counts.clone())
+        Connector::new(secure, follows, self.temper.clone(), self.counts.clone())
     }
 
-    fn web(&self, location: &Location) -> Result<Arc<dyn ObjectStore>> {
+    fn web(&self, location: &Location) -> Result<HttpStore> {
         let mut base = location.url.clone();
         base.set_path("");
-        let store = HttpBuilder::new()
+        HttpBuilder::new()
             .with_http_connector(self.client(base.as_str(), true))
             .with_retry(self.patience.retries())
             .with_url(base.to_string())
-            .build()?;
-        Ok(Arc::new(store))
+            .build()
     }
 
-    fn amazon(&self, location: &Location) -> Result<Arc<dyn ObjectStore>> {
+    pub(crate) fn amazon(&self, location: &Location) -> Result<AmazonS3> {
         let mut builder = aws::builder();
         let own = [AmazonS3ConfigKey::S3Endpoint, AmazonS3ConfigKey::Endpoint]
             .iter()
@@ -109,16 +149,28 @@ impl Door<'_> {
             let region = self.region(bucket).unwrap_or_else(|| "us-east-1".into());
             builder = builder.with_region(region);
         }
-        let store = builder
-            .with_http_connector(self.client(own.as_deref().unwrap_or("https://"), false))
-            .with_retry(self.patience.retries())
-            .with_url(location.url.as_str())
-            .build()?;
-        Ok(Arc::new(store))
+        built!(
+            self,
+            location,
+            builder,
+            own.as_deref().unwrap_or("https://")
+        )
+    }
+
+    /// The region of a bucket, which is asked for once.
+    fn region(&self, bucket: &str) -> Option<String> {
+        static KNOWN: Mutex<BTreeMap<String, String>> = Mutex::new(BTreeMap::new());
+        let known = || KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(region) = known().get(bucket) {
+            return Some(region.clone());
+        }
+        let region = self.asked_region(bucket)?;
+        known().insert(bucket.to_owned(), region.clone());
+        Some(region)
     }
 
     /// The region of a bucket, which Amazon tells anybody.
-    fn region(&self, bucket: &str) -> Option<String> {
+    fn asked_region(&self, bucket: &str) -> Option<String> {
         use object_store::client::{HttpConnector, HttpRequest, HttpRequestBody};
         let address = format!("https://s3.amazonaws.com/{bucket}");
         let request = http::Request::head(&address).body(HttpRequestBody::empty());
@@ -131,7 +183,8 @@ impl Door<'_> {
         Some(region.to_str().ok()?.to_owned())
     }
 
-    fn google(&self, location: &Location) -> Result<Arc<dyn ObjectStore>> {
+    /// Google's store, and its address.
+    pub(crate) fn google(&self, location: &Location) -> Result<(GoogleCloudStorage, String)> {
         let mut builder = GoogleCloudStorageBuilder::from_env();
         let mut base = builder.get_config_value(&GoogleConfigKey::BaseUrl);
         if let (None, Ok(emulator)) = (&base, std::env::var("STORAGE_EMULATOR_HOST")) {
@@ -155,18 +208,14 @@ impl Door<'_> {
             .any(|key| builder.get_config_value(key).is_some());
         let usual = std::env::home_dir()
             .map(|home| home.join(".config/gcloud/application_default_credentials.json"));
-        if !named && !usual.is_some_and(|file| file.is_file()) && !aws::has_metadata() {
+        if !named && !usual.is_some_and(|file| file.is_file()) && !has_metadata() {
             builder = builder.with_skip_signature(true);
         }
-        let store = builder
-            .with_http_connector(self.client(base.as_deref().unwrap_or("https://"), false))
-            .with_retry(self.patience.retries())
-            .with_url(location.url.as_str())
-            .build()?;
-        Ok(Arc::new(store))
+        let base = base.unwrap_or_else(|| GOOGLE.to_owned());
+        Ok((built!(self, location, builder, &base)?, base))
     }
 
-    fn azure(&self, location: &Location) -> Result<Arc<dyn ObjectStore>> {
+    pub(crate) fn azure(&self, location: &Location) -> Result<MicrosoftAzure> {
         let mut builder = MicrosoftAzureBuilder::from_env();
         let value = |key| builder.get_config_value(&key);
         let emulator = value(AzureConfigKey::UseEmulator).is_some_and(|v| v == "true");
@@ -185,14 +234,9 @@ impl Door<'_> {
             AzureConfigKey::UseAzureCli,
         ];
         let named = sources.into_iter().any(|key| value(key).is_some());
-        if !named && !emulator && !aws::has_metadata() {
+        if !named && !emulator && !has_metadata() {
             builder = builder.with_skip_signature(true);
         }
-        let store = builder
-            .with_http_connector(self.client(&address, false))
-            .with_retry(self.patience.retries())
-            .with_url(location.url.as_str())
-            .build()?;
-        Ok(Arc::new(store))
+        built!(self, location, builder, &address)
     }
 }

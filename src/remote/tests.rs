@@ -21,6 +21,8 @@ enum Manner {
     Changes,
     Absent,
     Closed,
+    /// Every answer is `503`.
+    Down,
 }
 
 /// Serves `content` until the test ends; returns the URL.
@@ -55,6 +57,7 @@ fn answer(mut stream: &TcpStream, content: &[u8], manner: Manner, count: &Atomic
         Manner::Busy if number % 3 == 2 => "503 Busy\r\nRetry-After: 0",
         Manner::Absent => "404 Not Found",
         Manner::Closed => "403 Forbidden",
+        Manner::Down => "503 Busy",
         _ => "",
     };
     if !status.is_empty() {
@@ -193,6 +196,36 @@ fn a_file_that_changes_is_an_error() {
     let error = read_all(&object).unwrap_err();
     assert_eq!(error.kind(), ErrorKind::InvalidData);
     assert!(error.to_string().contains("has changed"), "{error}");
+}
+
+#[test]
+fn one_client_opens_and_reads_a_file() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let url = format!("http://{}/a%20b/scan.laz", listener.local_addr().unwrap());
+    let connections = Arc::new(AtomicUsize::new(0));
+    let count = connections.clone();
+    std::thread::spawn(move || {
+        let (content, requests) = (content(), AtomicUsize::new(0));
+        for stream in listener.incoming().flatten() {
+            count.fetch_add(1, Ordering::Relaxed);
+            while answer(&stream, &content, Manner::Good, &requests) {}
+        }
+    });
+    let object = open(&url).unwrap();
+    for at in [1 << 20, 2 << 20, 3 << 20] {
+        assert_eq!(object.read_at(&mut [0; 100], at).unwrap(), 100);
+    }
+    assert_eq!(object.counts().requests(), 4);
+    assert_eq!(connections.load(Ordering::Relaxed), 1);
+}
+
+#[test]
+fn a_server_that_is_down_from_the_start_is_told_after_seconds() {
+    let begin = std::time::Instant::now();
+    let error = open(&serve(content(), Manner::Down)).unwrap_err();
+    assert!(error.to_string().contains("503"), "{error}");
+    let took = begin.elapsed().as_secs();
+    assert!((10..40).contains(&took), "{took} s");
 }
 
 #[test]

@@ -25,7 +25,7 @@ pub struct Opened {
 impl Folder {
     /// The folder at a path.
     pub fn new(path: &Path) -> io::Result<Self> {
-        let root = path.canonicalize()?;
+        let root = outcrop_platform::canonical(path)?;
         if !root.is_dir() {
             return Err(io::ErrorKind::NotADirectory.into());
         }
@@ -52,7 +52,7 @@ impl Folder {
             "glb" => "model/gltf-binary",
             _ => return None,
         };
-        let path = path.canonicalize().ok()?;
+        let path = outcrop_platform::canonical(&path).ok()?;
         if !path.starts_with(&self.root) || !path.is_file() {
             return None;
         }

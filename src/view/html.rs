@@ -62,7 +62,7 @@ pub fn write_html(folder: &Path, page: &Path, limit: u64) -> Result<Embedded> {
     let unfinished = unfinished(page);
     let written = write(&tileset, &files, &uris, &unfinished);
     let finished = written.and_then(|bytes| {
-        let renamed = std::fs::rename(&unfinished, page);
+        let renamed = outcrop_platform::rename(&unfinished, page);
         renamed.map_err(|e| Error::io(page, "write the page", e))?;
         Ok(bytes)
     });

@@ -122,6 +122,7 @@ const KEYS: &[&str] = &[
     "/mesh/boundary_edges",
     "/closed",
     "/tiles",
+    "/uploaded",
     "/coordinates",
     "/peak_resident_bytes",
     "/resident_file_bytes",

@@ -20,9 +20,11 @@ mod recipe;
 mod regions;
 mod scan_columns;
 mod scans;
+mod server;
 mod systems;
 mod text_columns;
 mod text_grammar;
+mod urls;
 
 use bench::{Bench, based, cloud, ply, positions, write_las};
 use outcrop::Error;

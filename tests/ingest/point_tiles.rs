@@ -46,7 +46,7 @@ fn rows(points: &[[i32; 3]]) -> Vec<u8> {
 }
 
 /// Writes a set of tiles; the hierarchy has a file of its own for each node of the first level.
-fn write(folder: &Path, data: &str, all: &[[i32; 3]]) -> PathBuf {
+pub fn write(folder: &Path, data: &str, all: &[[i32; 3]]) -> PathBuf {
     for part in ["ept-data", "ept-hierarchy"] {
         std::fs::create_dir_all(folder.join(part)).unwrap();
     }

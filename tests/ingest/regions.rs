@@ -146,7 +146,7 @@ fn nodes() -> Vec<([i32; 4], Vec<[i32; 3]>)> {
 }
 
 /// A COPC file, its hierarchy in two pages; `damage` changes the hierarchy.
-fn copc(damage: impl Fn(&mut Vec<u8>)) -> Vec<u8> {
+pub fn copc(damage: impl Fn(&mut Vec<u8>)) -> Vec<u8> {
     let items = LazItemRecordBuilder::default_for_point_format_id(6, 0).unwrap();
     let laszip = LazVlrBuilder::new(items).with_variable_chunk_size().build();
     let mut record = Vec::new();

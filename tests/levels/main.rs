@@ -3,6 +3,7 @@
 mod checks;
 mod closed;
 mod cloud;
+mod crossed;
 mod globe;
 mod kills;
 mod lossy;

@@ -6,7 +6,7 @@ use outcrop::{Error, Simplification, SimplifyReport};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-fn job(mesh: &Path, output: &Path, goal: Goal, most: u32) -> Simplification {
+pub fn job(mesh: &Path, output: &Path, goal: Goal, most: u32) -> Simplification {
     let options = Options {
         most_triangles: most,
         ..Options::of(goal)

@@ -179,6 +179,15 @@ impl Case {
         said.err
     }
 
+    /// Checks that an attempt that failed left the whole mesh under its name, or nothing.
+    pub fn check_whole_or_none(&self, what: &str) {
+        let none = self.outputs().is_empty();
+        assert!(
+            none || self.meshes() == self.expected,
+            "{what}: half a mesh"
+        );
+    }
+
     /// Checks that the run succeeded and left only the mesh.
     pub fn check(&self, said: &Said, what: &str) {
         assert_eq!(said.code, Some(0), "{what}: {said:?}");

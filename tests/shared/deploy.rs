@@ -35,7 +35,11 @@ fn runs(file: &str, pointer: &str, variable: &str, names: [&str; 3]) {
             let values = [
                 case.scratch.display().to_string(),
                 status.generation().to_string(),
-                shards.display().to_string(),
+                match file.contains("bucket") {
+                    // Tasks that share no folder are given a list.
+                    true => said.out.trim().replace('\n', ","),
+                    false => shards.display().to_string(),
+                },
             ];
             let put = |word: String| {
                 let found = names.iter().position(|name| *name == word);
@@ -77,6 +81,34 @@ fn aws_batch() {
 fn google_batch() {
     let pointer = "/taskGroups/0/taskSpec/runnables/0/container/commands";
     runs("google-batch/job.json", pointer, "BATCH_TASK_INDEX", NAMES);
+}
+
+const LISTED: [&str; 3] = ["FOLDER", "GENERATION", "LIST"];
+
+#[test]
+fn kubernetes_with_a_bucket() {
+    let pointer = "/spec/template/spec/containers/0/command";
+    runs(
+        "kubernetes/work-bucket.json",
+        pointer,
+        "JOB_COMPLETION_INDEX",
+        LISTED,
+    );
+}
+
+#[test]
+fn aws_batch_with_a_bucket() {
+    let names = ["Ref::folder", "Ref::generation", "Ref::shards"];
+    let pointer = "/containerProperties/command";
+    let file = "aws-batch/job-definition-bucket.json";
+    runs(file, pointer, "AWS_BATCH_JOB_ARRAY_INDEX", names);
+}
+
+#[test]
+fn google_batch_with_a_bucket() {
+    let pointer = "/taskGroups/0/taskSpec/runnables/0/container/commands";
+    let file = "google-batch/job-bucket.json";
+    runs(file, pointer, "BATCH_TASK_INDEX", LISTED);
 }
 
 /// Runs `deploy/drive` with a command of `deploy`; `programs` stand for those of a platform.
@@ -163,7 +195,7 @@ given = dict(zip(sys.argv[3::2], sys.argv[4::2]))
 if sys.argv[2] == "describe-jobs":
     print("SUCCEEDED")
     sys.exit()
-parameters = dict(pair.split("=", 1) for pair in given["--parameters"].split(","))
+parameters = json.loads(given["--parameters"])
 definition = json.load(open(os.environ["DEFINITION"]))["containerProperties"]["command"]
 put = lambda word: parameters[word[5:]] if word.startswith("Ref::") else word
 command = [put(word) for word in definition]

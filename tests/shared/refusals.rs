@@ -137,3 +137,66 @@ fn a_dry_run_shows_what_would_be_done() {
     assert!(said.out.contains("\"--mem=2500M\""), "{}", said.out);
     case.finish();
 }
+
+#[test]
+fn places_that_cannot_have_a_run_are_refused_before_anything_is_asked() {
+    let case = Case::new(&[]);
+    let input = case.input.display().to_string();
+    let mesh = case.mesh.display().to_string();
+    let bucket = "s3://bucket/runs";
+    let run = "s3://bucket/runs/mesh.ply-0.outcrop-scratch";
+    for (arguments, word) in [
+        (
+            &[
+                "plan",
+                &input,
+                "-o",
+                &mesh,
+                "--scratch",
+                "https://host/runs",
+            ][..],
+            "a web server takes no files",
+        ),
+        (
+            &["reconstruct", &input, "-o", &mesh, "--scratch", bucket],
+            "runs that tasks share (`outcrop plan`) can be in a store",
+        ),
+        (
+            &["submit", run, "--engine", "slurm"],
+            "a folder that all machines see",
+        ),
+        (
+            &["work", run, "--shard", "0", "--shards", "x"],
+            "numbers of shards like 3,7,12-15",
+        ),
+    ] {
+        let said = util::run(arguments);
+        assert!(said.code == Some(2) && said.err.contains(word), "{said:?}");
+        assert_eq!(said.err.lines().count(), 1, "{said:?}");
+    }
+}
+
+#[test]
+fn a_plan_is_resumed_or_begun_again_and_not_another_one() {
+    let case = Case::new(&[]);
+    case.plan(&["--shards", "2"]);
+    assert!(case.advance());
+    let arguments = |more: &[&str]| {
+        let paths = [&case.input, &case.mesh].map(|path| path.display().to_string());
+        let fixed = ["plan", &paths[0], "-o", &paths[1], "--block-points", "4096"];
+        let all = fixed.iter().chain(&["--tile-points", "1500"]).chain(more);
+        all.map(ToString::to_string).collect::<Vec<_>>()
+    };
+    let said = util::run(arguments(&["--resume", "--shards", "5"]));
+    assert_eq!(said.code, Some(0), "{said:?}");
+    assert_eq!(case.status().generation(), 1);
+    let said = util::run(arguments(&["--resume", "--smooth", "3"]));
+    assert!(
+        said.code == Some(2) && said.err.contains("smooth"),
+        "{said:?}"
+    );
+    let said = util::run(arguments(&["--restart", "--shards", "3"]));
+    assert_eq!(said.code, Some(0), "{said:?}");
+    assert_eq!(case.status().generation(), 0);
+    case.finish();
+}

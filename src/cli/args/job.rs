@@ -226,7 +226,7 @@ pub struct Job {
     #[arg(value_name = "INPUT", required = true)]
     pub inputs: Vec<PathBuf>,
     /// The mesh to write: .ply, .obj, .stl or .glb (all but OBJ binary), compressed with .zst behind it; or
-    /// DIR/tileset.json for levels of detail
+    /// DIR/tileset.json for levels of detail; also the URL of one in a store (s3://, gs://, az://)
     #[arg(long, short, value_name = "MESH.ply")]
     pub output: PathBuf,
     /// Write a normal for each vertex (PLY, OBJ, GLB)

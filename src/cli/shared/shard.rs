@@ -47,11 +47,44 @@ pub fn chosen(args: &Work) -> Result<Wanted> {
     let found = found
         .into_iter()
         .filter_map(|(name, value)| Some((name, value?)));
-    choose(
-        args.shard,
-        args.shards_file.as_deref(),
-        &found.collect::<Vec<_>>(),
-    )
+    let found: Vec<_> = found.collect();
+    match &args.shards {
+        Some(shards) => listed(choose(args.shard, None, &found)?, shards),
+        None => choose(args.shard, args.shards_file.as_deref(), &found),
+    }
+}
+
+/// The shard that an index selects in a list like `3,7,12-15`.
+fn listed(index: Wanted, shards: &str) -> Result<Wanted> {
+    let wrong = |found: String, expected: &str| Error::Parameter {
+        name: "shards",
+        found,
+        expected: expected.into(),
+    };
+    let mut left = index.number;
+    for part in shards.split(',') {
+        let (first, last) = part.split_once('-').unwrap_or((part, part));
+        let (Ok(first), Ok(last)) = (first.trim().parse::<u32>(), last.trim().parse::<u32>())
+        else {
+            return Err(wrong(
+                format!("{part:?}"),
+                "numbers of shards like 3,7,12-15",
+            ));
+        };
+        let count = last
+            .saturating_sub(first)
+            .saturating_add(u32::from(last >= first));
+        if left < count {
+            let number = first + left;
+            return Ok(Wanted {
+                number,
+                count: None,
+            });
+        }
+        left -= count;
+    }
+    let found = format!("{shards}, and the index {}", index.number);
+    Err(wrong(found, "a shard for each index"))
 }
 
 fn choose(
@@ -144,6 +177,19 @@ mod tests {
         );
         assert_eq!(choose(Some(plain(7)), None, &both).unwrap(), plain(7));
         assert!(choose(None, None, &[("BATCH_TASK_INDEX", "x".into())]).is_err());
+    }
+
+    #[test]
+    fn a_list_translates_the_index() {
+        for (index, shard) in [(0, 3), (1, 7), (2, 12), (5, 15)] {
+            assert_eq!(listed(plain(index), "3,7,12-15").unwrap(), plain(shard));
+        }
+        assert!(listed(plain(6), "3,7,12-15").is_err());
+        for bad in ["", "a", "1,,2", "5-", "0-99999999999"] {
+            assert!(listed(plain(1), bad).is_err(), "{bad}");
+        }
+        assert!(listed(plain(0), "5-4").is_err());
+        assert_eq!(listed(plain(1), "0-4294967295").unwrap(), plain(1));
     }
 
     #[test]

@@ -26,6 +26,18 @@ pub fn submit(args: &Submit) -> Result<bool> {
         how: args.how.clone(),
         ..*args
     };
+    let is_url = args
+        .folder
+        .to_str()
+        .is_some_and(|path| path.contains("://"));
+    if args.engine == Engine::Slurm && is_url {
+        return Err(Error::Parameter {
+            name: "scratch",
+            found: args.folder.display().to_string(),
+            expected: "a folder that all machines see: jobs of Slurm have their scripts in it"
+                .into(),
+        });
+    }
     match args.engine {
         Engine::Slurm if !args.how.within_allocation => slurm::Slurm::new(args)?.run(),
         Engine::Local | Engine::Slurm => local::Local::new(args)?.run(),

@@ -6,9 +6,9 @@ use std::path::Path;
 
 /// A folder for what is deleted at the end.
 pub struct Scratch {
-    folder: tempfile::TempDir,
-    /// Locked as long as the program runs, even if it is killed.
+    /// Locked as long as the program runs, even if it is killed; closed before the folder is deleted.
     _lock: File,
+    folder: tempfile::TempDir,
 }
 
 impl Scratch {

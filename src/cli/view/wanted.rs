@@ -1,6 +1,7 @@
 //! The meshes and points that the arguments name; invalid ones are refused before any work.
 
 use super::super::args::View;
+use super::super::jobs::local;
 use outcrop_disk::error::{Error, Result};
 use outcrop_view::{Part, Place, check};
 use std::path::{Path, PathBuf};
@@ -78,6 +79,7 @@ pub fn items(args: &View) -> Result<Vec<Item<'_>>> {
 
 /// Levels of detail, if the path has them, or a mesh that can be read.
 fn source(path: &Path) -> Result<Source<'_>> {
+    local(path)?;
     let tileset = path.file_name().is_some_and(|name| name == "tileset.json");
     if path.is_dir() || tileset {
         let folder = match path.parent().filter(|_| !path.is_dir()) {

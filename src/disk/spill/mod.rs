@@ -20,5 +20,6 @@ pub use release::release;
 pub use row::row;
 pub use row::{Row, Word};
 pub use shuffle::{Inbox, Shuffle};
+pub use sort::sort;
 pub use sorter::{Sorted, SortedRuns, Sorter};
 pub use table::Table;

@@ -3,13 +3,11 @@
 use super::Row;
 use crate::error::{Error, Result};
 use crate::workspace::file::ScratchFile;
-use crate::workspace::open::open_existing;
 use crate::workspace::place::Place;
 use crate::workspace::{Files, Unit};
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
-use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
+use std::io::Read;
 use std::sync::Arc;
 
 /// Rows in a checksummed frame of a run.
@@ -182,32 +180,46 @@ impl<R: Row> RunWriter<R> {
 struct RunReader<'a, R: Row> {
     run: &'a Run<R>,
     to: Option<R>,
-    source: std::io::BufReader<File>,
+    source: std::io::BufReader<Bytes<'a, R>>,
     offset: u64,
     frame: Vec<R>,
     at: usize,
 }
 
+/// The bytes of a run from a place on.
+struct Bytes<'a, R: Row> {
+    run: &'a Run<R>,
+    at: u64,
+}
+
+impl<R: Row> Read for Bytes<'_, R> {
+    fn read(&mut self, buffer: &mut [u8]) -> std::io::Result<usize> {
+        let left = (self.run.place.bytes as u64).saturating_sub(self.at);
+        let count = buffer
+            .len()
+            .min(usize::try_from(left).unwrap_or(usize::MAX));
+        let (file, segment) = (&self.run.file, self.run.place.segment);
+        let read = file.read(segment, self.at, &mut buffer[..count]);
+        read.map_err(|error| match error {
+            Error::Io { source, .. } => source,
+            _ => std::io::ErrorKind::UnexpectedEof.into(),
+        })?;
+        self.at += count as u64;
+        Ok(count)
+    }
+}
+
 impl<'a, R: Row> RunReader<'a, R> {
     /// Positioned before the first row that is not below `from`.
     fn open(run: &'a Run<R>, from: Option<R>, to: Option<R>) -> Result<Self> {
-        let path = run.file.path(run.place.segment);
-        let io = |action: &'static str| {
-            let path = path.clone();
-            move |e| Error::io(path, action, e)
-        };
-        let mut file = open_existing(&path).map_err(io("open"))?;
         // The frame before the first that begins at or above `from` may end above `from`.
         let is_below = |from: R| move |row: &R| row.compare(&from) == Ordering::Less;
         let below = from.map_or(0, |from| run.firsts.partition_point(is_below(from)));
         let offset = below.saturating_sub(1) as u64 * frame_bytes::<R>();
-        if offset > 0 {
-            file.seek(SeekFrom::Start(offset)).map_err(io("seek in"))?;
-        }
         let mut reader = Self {
             run,
             to,
-            source: std::io::BufReader::with_capacity(FILE_BUFFER, file),
+            source: std::io::BufReader::with_capacity(FILE_BUFFER, Bytes { run, at: offset }),
             offset,
             frame: Vec::new(),
             at: 0,
@@ -267,7 +279,6 @@ impl<'a, R: Row> RunReader<'a, R> {
         if crc != head[1] {
             return Err(self.corrupt(format!("checksum {crc:08x}"), format!("{:08x}", head[1])));
         }
-        self.run.file.count_read(all);
         self.offset += all;
         self.at = 0;
         Ok(())

@@ -3,8 +3,8 @@
 //! A sender writes its rows once, sorted by receiver, with an index; a receiver reads its parts of all
 //! senders and merges them. So nothing depends on the order in which senders are done.
 
-use super::Row;
 use super::table::{append_packed, read_rows};
+use super::{Row, sort};
 use crate::error::{Error, Result};
 use crate::workspace::file::ScratchFile;
 use crate::workspace::memory::{Reservation, bytes_of};
@@ -59,7 +59,7 @@ impl<R: Row> Shuffle<R> {
         if rows.is_empty() {
             return Ok(());
         }
-        rows.sort_unstable_by(R::compare);
+        sort::sort(&mut rows);
         let (mut index, mut body, mut packed) = (Vec::new(), Vec::new(), Vec::new());
         for part in rows.chunk_by(|a, b| receiver(a) == receiver(b)) {
             let place = append_packed(part, &mut packed, &mut body);
@@ -85,7 +85,54 @@ impl<R: Row> Shuffle<R> {
     /// # Errors
     /// [`crate::error::Error::Io`], [`crate::error::Error::Corrupt`], [`crate::error::Error::Memory`].
     pub fn open(&self, workspace: &Workspace, receivers: usize) -> Result<Inbox<R>> {
-        let file = workspace.files.open(&self.name, true)?;
+        Ok(Inbox {
+            parts: Parts::open(workspace, &self.name, receivers)?,
+            unique: false,
+            rows: PhantomData,
+        })
+    }
+}
+
+/// Bytes of memory for a part in the list of an inbox.
+const ENTRY: u64 = size_of::<(u32, Place)>() as u64;
+
+/// The index of a sender whose rows are at `place`.
+fn read_index(file: &ScratchFile, place: Place) -> Result<Vec<Part>> {
+    if place.bytes == 0 {
+        return Ok(Vec::new());
+    }
+    let mut count = [0; 4];
+    file.read(place.segment, place.offset, &mut count)?;
+    let count = u32::from_ne_bytes(count) as usize;
+    if 4 + count * size_of::<Part>() > place.bytes {
+        let (found, expected) = (format!("{count} parts"), format!("{} bytes", place.bytes));
+        return Err(file.damaged(place.segment, place.offset, found, expected));
+    }
+    let mut index = vec![Part::default(); count];
+    let bytes = bytemuck::cast_slice_mut(&mut index);
+    file.read(place.segment, place.offset + 4, bytes)?;
+    Ok(index)
+}
+
+/// The receiver of a row.
+fn receiver(row: &impl Row) -> u32 {
+    row.words()[0]
+}
+
+/// Where the rows sent to each receiver are, whatever their kind.
+#[derive(Debug)]
+struct Parts {
+    file: Arc<ScratchFile>,
+    /// The parts by receiver, then in the order of senders.
+    list: Vec<(u32, Place)>,
+    /// For each receiver the number of parts before its own.
+    starts: Vec<u32>,
+    _held: Reservation,
+}
+
+impl Parts {
+    fn open(workspace: &Workspace, name: &str, receivers: usize) -> Result<Self> {
+        let file = workspace.files.open(name, true)?;
         let list = (receivers as u64 + 1) * size_of::<u32>() as u64;
         let mut held = workspace.promise("shuffle", list)?;
         let mut parts: Vec<(u32, Place)> = Vec::new();
@@ -124,54 +171,36 @@ impl<R: Row> Shuffle<R> {
             starts.push(parts.partition_point(|(r, _)| (*r as usize) < receiver) as u32);
         }
         held.set_held(list + parts.capacity() as u64 * ENTRY);
-        Ok(Inbox {
+        Ok(Self {
             file,
-            parts,
+            list: parts,
             starts,
-            unique: false,
-            rows: PhantomData,
             _held: held,
         })
     }
-}
 
-/// Bytes of memory for a part in the list of an inbox.
-const ENTRY: u64 = size_of::<(u32, Place)>() as u64;
-
-/// The index of a sender whose rows are at `place`.
-fn read_index(file: &ScratchFile, place: Place) -> Result<Vec<Part>> {
-    if place.bytes == 0 {
-        return Ok(Vec::new());
+    fn of(&self, receiver: usize) -> &[(u32, Place)] {
+        &self.list[self.starts[receiver] as usize..self.starts[receiver + 1] as usize]
     }
-    let mut count = [0; 4];
-    file.read(place.segment, place.offset, &mut count)?;
-    let count = u32::from_ne_bytes(count) as usize;
-    if 4 + count * size_of::<Part>() > place.bytes {
-        let (found, expected) = (format!("{count} parts"), format!("{} bytes", place.bytes));
-        return Err(file.damaged(place.segment, place.offset, found, expected));
-    }
-    let mut index = vec![Part::default(); count];
-    let bytes = bytemuck::cast_slice_mut(&mut index);
-    file.read(place.segment, place.offset + 4, bytes)?;
-    Ok(index)
-}
 
-/// The receiver of a row.
-fn receiver(row: &impl Row) -> u32 {
-    row.words()[0]
+    fn rows(&self, receiver: usize) -> usize {
+        let parts = self.of(receiver).iter();
+        parts.map(|(_, place)| place.records).sum()
+    }
+
+    /// Number of rows for which there is room in memory: all, unless the index is damaged.
+    fn fitting(&self, receiver: usize) -> usize {
+        let bytes: usize = self.of(receiver).iter().map(|(_, place)| place.bytes).sum();
+        self.rows(receiver).min(4 * bytes)
+    }
 }
 
 /// The rows sent to each receiver.
 #[derive(Debug)]
 pub struct Inbox<R: Row> {
-    file: Arc<ScratchFile>,
-    /// The parts by receiver, then in the order of senders.
-    parts: Vec<(u32, Place)>,
-    /// For each receiver the number of parts before its own.
-    starts: Vec<u32>,
+    parts: Parts,
     unique: bool,
     rows: PhantomData<fn() -> R>,
-    _held: Reservation,
 }
 
 impl<R: Row> Inbox<R> {
@@ -184,15 +213,10 @@ impl<R: Row> Inbox<R> {
         }
     }
 
-    fn of(&self, receiver: usize) -> &[(u32, Place)] {
-        &self.parts[self.starts[receiver] as usize..self.starts[receiver + 1] as usize]
-    }
-
     /// Number of rows sent to a receiver.
     #[must_use]
     pub fn rows(&self, receiver: usize) -> usize {
-        let parts = self.of(receiver).iter();
-        parts.map(|(_, place)| place.records).sum()
+        self.parts.rows(receiver)
     }
 
     /// All rows sent to a receiver, ascending.
@@ -200,12 +224,14 @@ impl<R: Row> Inbox<R> {
     /// # Errors
     /// [`crate::error::Error::Io`]; [`crate::error::Error::Corrupt`] if the bytes do not match their checksum.
     pub fn get(&self, unit: &Unit<'_>, receiver: usize) -> Result<Vec<R>> {
-        let mut rows = Vec::with_capacity(self.fitting(receiver));
-        for (_, place) in self.of(receiver) {
-            read_rows(&self.file, *place, &mut rows, |bytes| unit.hold(bytes))?;
+        let mut rows = Vec::with_capacity(self.parts.fitting(receiver));
+        for (_, place) in self.parts.of(receiver) {
+            read_rows(&self.parts.file, *place, &mut rows, |bytes| {
+                unit.hold(bytes)
+            })?;
         }
         // Consists of ascending runs, which this sort merges.
-        rows.sort_by(R::compare);
+        sort::merge(&mut rows);
         if self.unique {
             rows.dedup();
         }
@@ -216,13 +242,7 @@ impl<R: Row> Inbox<R> {
     #[must_use]
     pub fn missing(&self, receiver: usize, expected: &str) -> Error {
         let found = format!("{} rows for {receiver}", self.rows(receiver));
-        self.file.damaged(0, 0, found, expected.to_owned())
-    }
-
-    /// Number of rows for which there is room in memory: all, unless the index is damaged.
-    fn fitting(&self, receiver: usize) -> usize {
-        let bytes: usize = self.of(receiver).iter().map(|(_, place)| place.bytes).sum();
-        self.rows(receiver).min(4 * bytes)
+        self.parts.file.damaged(0, 0, found, expected.to_owned())
     }
 }
 
@@ -253,7 +273,7 @@ mod tests {
             want.dedup();
             assert_eq!(unique.get(&unit, receiver as usize).unwrap(), want);
         }
-        unique.parts[3].1.crc ^= 1;
+        unique.parts.list[3].1.crc ^= 1;
         let damaged = (0..9).map(|receiver| unique.get(&unit, receiver));
         assert!(
             damaged

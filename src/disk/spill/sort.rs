@@ -1,4 +1,4 @@
-//! Sorting rows in memory on several threads.
+//! Sorting rows in memory.
 
 use super::Row;
 use std::cmp::Ordering;
@@ -9,10 +9,60 @@ const LEAF: usize = 1 << 16;
 /// Rows from which a pivot is chosen.
 const SAMPLE: usize = 31;
 
+/// Rows of up to so many words are sorted by code that is compiled once for each number of words, not for each
+/// kind of row.
+const WIDEST: usize = 8;
+
+#[derive(Debug, Clone, Copy)]
+enum Way {
+    Threads,
+    OneThread,
+    Runs,
+}
+
 /// Sorts on the current threads of rayon. The order of equal rows is unspecified.
-pub(super) fn sort<R: Row>(records: &mut [R]) {
-    // If the pivots are bad at many levels, which is very unlikely, one thread does the rest.
-    sort_part(records, 2 * records.len().max(1).ilog2());
+pub(super) fn sort_on_threads<R: Row>(rows: &mut [R]) {
+    put_in_order(rows, Way::Threads);
+}
+
+/// Sorts on this thread. The order of equal rows is unspecified, but equal rows have equal words.
+pub fn sort<R: Row>(rows: &mut [R]) {
+    put_in_order(rows, Way::OneThread);
+}
+
+/// Sorts rows that consist of ascending runs, which takes less time the longer these are.
+pub(super) fn merge<R: Row>(rows: &mut [R]) {
+    put_in_order(rows, Way::Runs);
+}
+
+fn put_in_order<R: Row>(rows: &mut [R], way: Way) {
+    if const { R::WORDS <= WIDEST } {
+        by_width(bytemuck::cast_slice_mut(rows), R::WORDS, way);
+    } else {
+        sort_as(rows, way);
+    }
+}
+
+fn by_width(words: &mut [u32], width: usize, way: Way) {
+    match width {
+        1 => sort_as(bytemuck::cast_slice_mut::<_, [u32; 1]>(words), way),
+        2 => sort_as(bytemuck::cast_slice_mut::<_, [u32; 2]>(words), way),
+        3 => sort_as(bytemuck::cast_slice_mut::<_, [u32; 3]>(words), way),
+        4 => sort_as(bytemuck::cast_slice_mut::<_, [u32; 4]>(words), way),
+        5 => sort_as(bytemuck::cast_slice_mut::<_, [u32; 5]>(words), way),
+        6 => sort_as(bytemuck::cast_slice_mut::<_, [u32; 6]>(words), way),
+        7 => sort_as(bytemuck::cast_slice_mut::<_, [u32; 7]>(words), way),
+        _ => sort_as(bytemuck::cast_slice_mut::<_, [u32; WIDEST]>(words), way),
+    }
+}
+
+fn sort_as<R: Row>(rows: &mut [R], way: Way) {
+    match way {
+        // If the pivots are bad at many levels, which is very unlikely, one thread does the rest.
+        Way::Threads => sort_part(rows, 2 * rows.len().max(1).ilog2()),
+        Way::OneThread => rows.sort_unstable_by(R::compare),
+        Way::Runs => rows.sort_by(R::compare),
+    }
 }
 
 fn sort_part<R: Row>(records: &mut [R], depth: u32) {
@@ -55,7 +105,7 @@ mod tests {
     fn check<R: Row + Ord>(mut records: Vec<R>) {
         let mut want = records.clone();
         want.sort_unstable();
-        sort(&mut records);
+        sort_on_threads(&mut records);
         assert!(records == want);
     }
 

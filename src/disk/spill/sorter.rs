@@ -87,7 +87,9 @@ impl<R: Row> Sorter<R> {
 
     /// Sorts the rows in the buffer and writes them as a run.
     fn spill(&self, state: &mut State<R>, kept: bool) -> Result<()> {
-        self.files.pool().install(|| sort::sort(&mut state.buffer));
+        self.files
+            .pool()
+            .install(|| sort::sort_on_threads(&mut state.buffer));
         let writer = self.run_writer(&mut state.made, kept)?;
         state.write(writer)
     }
@@ -241,7 +243,9 @@ impl<R: Row> Sorter<R> {
         };
         state.settle()?;
         if state.runs.is_empty() {
-            self.files.pool().install(|| sort::sort(&mut state.buffer));
+            self.files
+                .pool()
+                .install(|| sort::sort_on_threads(&mut state.buffer));
             return Ok(Sorted {
                 buffer: state.buffer,
                 runs: Vec::new(),

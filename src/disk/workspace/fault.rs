@@ -2,6 +2,7 @@
 
 use std::io;
 use std::sync::OnceLock;
+use std::time::Duration;
 
 /// Events at which a fault can be injected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,6 +46,9 @@ pub trait Faults: Send + Sync {
     /// Most bytes that a format of meshes holds, of `bytes` without a fault.
     fn most(&self, bytes: u64) -> u64;
 
+    /// Time between two signs of life of a process whose files are in a store; `usual` without a fault.
+    fn beat(&self, usual: Duration) -> Duration;
+
     /// At the end of the work.
     fn finish(&self);
 }
@@ -73,6 +77,12 @@ pub fn fallible(event: Event) -> io::Result<()> {
 #[must_use]
 pub fn most(bytes: u64) -> u64 {
     FAULTS.get().map_or(bytes, |faults| faults.most(bytes))
+}
+
+/// Time between two signs of life of a process whose files are in a store; `usual` without a fault.
+#[must_use]
+pub fn beat(usual: Duration) -> Duration {
+    FAULTS.get().map_or(usual, |faults| faults.beat(usual))
 }
 
 /// Writes a record; if the program has to end at it, only a part of the record.

@@ -3,6 +3,7 @@
 //! A file consists of segments `NAME.0`, `NAME.1` …, each written by one thread of one attempt at the run.
 //! Its numbered sections are contiguous parts of segments.
 
+use super::away::Away;
 use super::fault::{self, Event};
 use super::keeper::{Kept, Leaving};
 use super::mapped::Mapping;
@@ -30,6 +31,7 @@ const FEW: usize = 1024;
 /// A part of a scratch file that one thread writes.
 #[derive(Debug)]
 struct Segment {
+    number: u32,
     kept: Arc<Kept>,
     /// The handle; closed segments are opened again by their readers.
     file: Mutex<Option<Arc<File>>>,
@@ -90,6 +92,7 @@ impl ScratchFile {
         }
         let path = self.shared.folder.join(format!("{}.{number}", self.name));
         let segment = Arc::new(Segment {
+            number,
             kept: Arc::new(Kept::new(path)),
             file: Mutex::new(None),
             end: AtomicU64::new(0),
@@ -112,11 +115,39 @@ impl ScratchFile {
         self.segment(segment).kept.path.clone()
     }
 
+    /// The store that has a segment, if other machines made it and share no folder.
+    fn away(&self, segment: &Segment) -> Option<&Away> {
+        let run = self.shared.run.as_ref().filter(|_| self.kept)?;
+        run.away_of(segment.number)
+    }
+
+    /// The error of a segment of which bytes cannot be read: offset and number.
+    fn unread(
+        &self,
+        segment: &Segment,
+        (offset, wanted): (u64, usize),
+        e: std::io::Error,
+    ) -> Error {
+        use std::io::ErrorKind::{NotFound, QuotaExceeded, StorageFull, UnexpectedEof};
+        let path = &segment.kept.path;
+        match e.kind() {
+            UnexpectedEof | NotFound => {
+                let (found, wanted) = ("the end of the file".into(), format!("{wanted} bytes"));
+                self.damaged(segment.number, offset, found, wanted)
+            }
+            // There is no room for a copy.
+            StorageFull | QuotaExceeded => failed_write(path, wanted, 0, e),
+            _ => Error::io(path, format!("read {wanted} bytes"), e),
+        }
+    }
+
     /// Deletes the file; a later attempt does not need it any more.
     pub(super) fn delete(&self) -> Result<()> {
         if self.gone {
             return Ok(());
         }
+        // Where a name stays until the last handle is closed, it would be in the way.
+        self.close();
         let segments = self.segments().into_iter();
         let leaving = segments.map(|s| Leaving(s.kept.clone(), s.end()));
         match &self.shared.run {
@@ -266,16 +297,13 @@ impl ScratchFile {
             return Ok(());
         }
         let of = self.segment(segment);
-        let read = self
-            .opened(&of)
-            .and_then(|f| f.read_exact_at(bytes, offset));
-        read.map_err(|e| match e.kind() {
-            std::io::ErrorKind::UnexpectedEof | std::io::ErrorKind::NotFound => {
-                let found = "the end of the file".to_owned();
-                self.damaged(segment, offset, found, format!("{wanted} bytes"))
-            }
-            _ => Error::io(&of.kept.path, format!("read {wanted} bytes"), e),
-        })?;
+        let read = match self.away(&of) {
+            Some(away) => away.read(&of.kept.path, of.end(), bytes, offset),
+            None => self
+                .opened(&of)
+                .and_then(|f| f.read_exact_at(bytes, offset)),
+        };
+        read.map_err(|e| self.unread(&of, (offset, wanted), e))?;
         self.shared.io.add_read(wanted as u64);
         Ok(())
     }
@@ -299,6 +327,11 @@ impl ScratchFile {
     pub fn map(&self) -> Option<(HashMap<u32, Mapping>, Reservation)> {
         let (bytes, memory) = (self.bytes(), &self.shared.memory);
         let io = self.shared.storage().io;
+        let run = self.shared.run.as_ref();
+        // What is elsewhere is fetched as far as it is read.
+        if run.is_some_and(|run| run.away().is_some()) {
+            return None;
+        }
         if bytes == 0 || !io.maps(&self.shared.folder, bytes, memory.available()) {
             return None;
         }
@@ -354,11 +387,6 @@ impl ScratchFile {
         }
         let (found, expected) = (format!("checksum {crc:08x}"), format!("{:08x}", place.crc));
         Err(self.damaged(place.segment, place.offset, found, expected))
-    }
-
-    /// Counts bytes that were read without [`ScratchFile::read`].
-    pub fn count_read(&self, bytes: u64) {
-        self.shared.io.add_read(bytes);
     }
 
     /// The error for content that differs from what was written.

@@ -169,7 +169,7 @@ impl Folder {
             _ => is_private(path)?,
         };
         let begun = Self::locked(path, Vec::new())?.restart(manifest);
-        begun.inspect_err(|_| Self::remove(path, false))
+        begun.inspect_err(|_| _ = Self::remove(path, false))
     }
 
     /// Empties the folder for a new run.
@@ -207,8 +207,9 @@ impl Folder {
     }
 
     /// Removes a folder, in an order that may be interrupted: the rest is a folder of a run that begins, or,
-    /// if the journal records that the data are deleted, of a finished one.
-    pub fn remove(path: &Path, finished: bool) {
+    /// if the journal records that the data are deleted, of a finished one. False if the folder is left, with the names
+    /// of files that are open, or with what cannot be deleted.
+    pub fn remove(path: &Path, finished: bool) -> bool {
         let delete = |name: &str| {
             fault::point(Event::Delete);
             // A file that cannot be deleted does no harm.
@@ -228,7 +229,7 @@ impl Folder {
         let workers = ours.iter().filter(|name| journal::worker(name).is_some());
         workers.for_each(|name| delete(name));
         delete(LOCK);
-        let _ = std::fs::remove_dir(path);
+        std::fs::remove_dir(path).is_ok() || !path.exists()
     }
 
     /// Opens the run in the folder on `threads` threads, with the results of earlier attempts.
@@ -249,6 +250,7 @@ impl Folder {
             let places = Whereabouts {
                 folder: &self.path,
                 output: &self.output,
+                away: None,
             };
             let (mut history, mut ends) = read_history(&self.path, u64::MAX)?;
             if let Some(until) = recover(&mut history, &places, observer, cancel)? {

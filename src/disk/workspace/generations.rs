@@ -11,13 +11,14 @@
 //! So nothing is written by two, whatever is linked is whole, and anything may be done twice.
 
 use super::IoCounters;
+use super::away::Away;
 use super::folder::{GENERATIONS, is_private, is_shared, sealed, unsealed};
 use super::history::History;
 use super::journal::{self, Journal, OpenStep, Record, Sharing, Took};
 use super::memory::MemoryPool;
 use super::open::{failed_write, open_existing, options};
 use super::run::ResumableRun;
-use crate::error::{Error, Remedy, Result};
+use crate::error::{Error, Remedy, Result, Setting};
 use outcrop_platform::{FileAt, make_private_folder};
 use publish::{link, sync};
 use std::io::ErrorKind;
@@ -26,6 +27,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 mod attempt;
+mod away;
 mod damage;
 mod publish;
 mod state;
@@ -48,6 +50,8 @@ pub struct SharedFolder {
     pub path: PathBuf,
     /// The manifest of the run.
     pub manifest: Vec<u8>,
+    /// The store that has the run, if no folder is shared; `path` is then that of this process alone.
+    away: Option<Arc<Away>>,
 }
 
 /// The state of a run at the beginning of a generation.
@@ -151,6 +155,7 @@ impl SharedFolder {
             std::fs::create_dir_all(parent).map_err(io("make the folder"))?;
         }
         make_private_folder(path).map_err(|e| match e.kind() {
+            ErrorKind::AlreadyExists if is_shared(path) => exists(path),
             ErrorKind::AlreadyExists => Error::not_resumable(path, "it exists already")
                 .with(Remedy::Remove)
                 .with(Remedy::Another("scratch")),
@@ -169,6 +174,7 @@ impl SharedFolder {
         let new = Self {
             path: path.to_path_buf(),
             manifest,
+            away: None,
         };
         let begun = new.attempt(0, 0);
         let journal = Journal::create(&begun)?;
@@ -212,6 +218,7 @@ impl SharedFolder {
         Ok(Self {
             path: path.to_path_buf(),
             manifest,
+            away: None,
         })
     }
 
@@ -238,9 +245,8 @@ impl SharedFolder {
     /// # Errors
     /// [`Error::Io`].
     pub fn newest(&self) -> Result<u64> {
-        let folder = self.path.join(GENERATIONS);
-        let names = std::fs::read_dir(&folder).map_err(|e| Error::io(&folder, "list", e))?;
-        let numbers = names.filter_map(|name| name.ok()?.file_name().to_str()?.parse().ok());
+        let names = self.entries(&self.path.join(GENERATIONS))?.into_iter();
+        let numbers = names.filter_map(|entry| entry.name.parse().ok());
         let missing = "its first generation is missing; remove it and plan again";
         numbers
             .max()
@@ -250,7 +256,7 @@ impl SharedFolder {
     /// True if a generation has begun, also if a list of the folder does not show it yet.
     #[must_use]
     pub fn has_begun(&self, number: u64) -> bool {
-        open_existing(&self.generation(number)).is_ok()
+        self.is_there(&self.generation(number)).unwrap_or(false)
     }
 
     /// The state of the run at the beginning of a generation.
@@ -258,7 +264,7 @@ impl SharedFolder {
     /// # Errors
     /// [`Error::Corrupt`], [`Error::Io`].
     pub fn read(&self, number: u64) -> Result<Generation> {
-        self.read_journal(number, &self.generation(number))
+        self.read_journal(number, &self.here(self.generation(number))?)
     }
 
     /// How tasks share the run.
@@ -266,7 +272,8 @@ impl SharedFolder {
     /// # Errors
     /// [`Error::Corrupt`], [`Error::Io`].
     pub fn sharing(&self) -> Result<Sharing> {
-        let (path, mut found) = (self.generation(self.newest()?), None);
+        let newest = self.generation(self.newest()?);
+        let (path, mut found) = (self.here(newest)?, None);
         journal::read(&path, None, |entry| {
             if let Record::Shared(sharing) = entry.record {
                 found = Some(sharing.clone());
@@ -309,4 +316,12 @@ impl SharedFolder {
             expected: "a journal whose records match their checksums".into(),
         }
     }
+}
+
+/// The error of a new run in the place of another one.
+fn exists(path: &Path) -> Error {
+    Error::not_resumable(path, "it exists already")
+        .with(Remedy::Give(Setting::Flag("resume"), "goes on with it"))
+        .with(Remedy::Give(Setting::Flag("restart"), "begins again"))
+        .with(Remedy::Another("scratch"))
 }

@@ -22,7 +22,7 @@ use std::sync::{Arc, Mutex};
 pub const NAME: &str = "journal";
 
 /// The first bytes of the file; the digit is the version of the journal's format.
-const MAGIC: &[u8; 8] = b"OUTCROP2";
+pub(super) const MAGIC: &[u8; 8] = b"OUTCROP2";
 
 /// Bytes before the body of a record.
 const HEAD: u64 = 8;
@@ -130,6 +130,17 @@ pub struct Task {
     pub shard: u32,
 }
 
+/// Requests to a store, and their bytes.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Traffic {
+    /// Number of requests.
+    pub requests: u64,
+    /// Bytes of the answers.
+    pub fetched: u64,
+    /// Bytes of what was put.
+    pub sent: u64,
+}
+
 /// The resources that a process took.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Took {
@@ -145,6 +156,8 @@ pub struct Took {
     pub read: u64,
     /// Bytes written.
     pub written: u64,
+    /// Requests to the store of the run, if it is in one.
+    pub traffic: Traffic,
     /// Points of the cloud, as far as they are known; of the program between two generations.
     pub points: u64,
     /// Seconds since the beginning of 1970 at its end.

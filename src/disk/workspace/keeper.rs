@@ -172,7 +172,10 @@ impl Rounds {
             self.synced(&file.path, file.sync())?;
         }
         // Syncs the names of new files.
-        self.synced(&self.path, sync(|| self.folder.sync_all()))?;
+        self.synced(
+            &self.path,
+            sync(|| outcrop_platform::sync_names(&self.folder)),
+        )?;
         for journal in &self.journals {
             self.synced(&self.path, sync(|| journal.sync_data()))?;
         }

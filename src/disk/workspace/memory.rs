@@ -21,7 +21,7 @@ use std::sync::{Arc, Condvar, Mutex};
 pub const MINIMUM_BUDGET: u64 = 192 << 20;
 
 /// Part of the budget for the program itself before any work: code, tables, stacks.
-pub const PROGRAM: u64 = 11 << 20;
+pub const PROGRAM: u64 = 13 << 20;
 
 /// Bytes that a thread which has worked holds beside its units: its stack, small lists, and the free pieces
 /// that the allocator keeps for it between larger ones. Paid from [`SLACK`].
@@ -35,7 +35,7 @@ const TIGHT_THREAD: u64 = 7 << 18;
 const TIGHT: u64 = 512 << 20;
 
 /// Part of the budget for memory that is not reserved by name: small buffers, allocator slack.
-pub const SLACK: u64 = 37 << 20;
+pub const SLACK: u64 = 35 << 20;
 
 /// Part of the budget that no stage can reserve.
 pub const OVERHEAD: u64 = PROGRAM + SLACK;
@@ -218,6 +218,20 @@ impl MemoryPool {
         self.state().held.add(name, bytes);
         reservation.held = bytes;
         Ok(reservation)
+    }
+
+    /// Reserves `bytes` under `name` for as long as the pool is used; only the first call counts.
+    ///
+    /// # Errors
+    /// As [`MemoryPool::reserve`].
+    pub fn keep(&self, name: &'static str, bytes: u64) -> Result<()> {
+        if self.state().holders.contains_key(name) {
+            return Ok(());
+        }
+        let mut kept = self.reserve(name, bytes)?;
+        // Nothing is left to give back.
+        (kept.bytes, kept.held) = (0, 0);
+        Ok(())
     }
 
     /// Reserves `bytes` that are not in use yet.

@@ -2,6 +2,7 @@
 //!
 //! The workspace knows neither stages nor rows. Stages obtain memory, files and threads from it.
 
+pub mod away;
 pub mod compressed;
 mod counters;
 pub mod course;
@@ -49,7 +50,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicI32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use storage::Shared;
 
 /// The scratch folder, memory budget, threads, progress and cancellation of one run.
@@ -75,6 +76,30 @@ pub struct Workspace {
     numbers: AtomicU64,
     parts: Mutex<Vec<(&'static str, f64)>>,
     pool: Arc<rayon::ThreadPool>,
+    /// The last field, so that all handles are closed before.
+    left: Left,
+}
+
+/// A folder that could not be removed because files in it were open.
+#[derive(Debug, Default)]
+struct Left(Mutex<Option<PathBuf>>);
+
+/// Attempts to remove it, and the time between them: the thread that syncs may be at work for a moment.
+const REMOVALS: u32 = 50;
+const REMOVAL_PAUSE: Duration = Duration::from_millis(20);
+
+impl Drop for Left {
+    fn drop(&mut self) {
+        let Some(folder) = lock(&self.0).take() else {
+            return;
+        };
+        for _ in 0..REMOVALS {
+            if std::fs::remove_dir(&folder).is_ok() || !folder.exists() {
+                return;
+            }
+            std::thread::sleep(REMOVAL_PAUSE);
+        }
+    }
 }
 
 /// Makes a folder in one that exists, unless it is there.
@@ -160,6 +185,7 @@ impl Workspace {
             numbers: AtomicU64::new(0),
             parts: Mutex::default(),
             pool,
+            left: Left::default(),
         }
     }
 
@@ -272,7 +298,9 @@ impl Workspace {
     /// Removes the folder if the run is `finished` or cannot be resumed.
     pub fn remove(&self, finished: bool) {
         let finished = finished && self.shared.run.as_ref().is_some_and(|r| r.retire().is_ok());
-        Folder::remove(&self.folder, finished);
+        if !Folder::remove(&self.folder, finished) {
+            *lock(&self.left.0) = Some(self.folder.clone());
+        }
     }
 
     /// Sets the estimated peak of the scratch space in bytes: for the message when the disk is full, and to
@@ -282,7 +310,8 @@ impl Workspace {
         let auto = self.shared.storage().compression == Compression::Auto;
         if auto && self.shared.level.load(Ordering::Relaxed) == storage::UNDECIDED {
             self.shared.level.store(0, Ordering::Relaxed);
-            if disk::compression_pays(&self.folder, bytes, self.threads) {
+            let away = self.run().is_some_and(|run| run.away().is_some());
+            if away || disk::compression_pays(&self.folder, bytes, self.threads) {
                 // Without room for it, rows are not compressed.
                 let _ = self.compress_rows(1);
             }

@@ -1,11 +1,12 @@
 //! Recovery: all parts of files that are still needed are read and checked, and damaged ones are made again,
 //! with as little work as possible.
 
+use super::away::Away;
 use super::history::{History, Needed, Remedy};
 use super::names::{OUTPUT, square_path, temporary};
 use super::open::open_existing;
 use super::progress::{Cancel, Observer};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use outcrop_platform::FileAt;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -29,6 +30,8 @@ pub const RENAMED: u32 = u32::MAX - 1;
 pub struct Whereabouts<'a> {
     pub folder: &'a Path,
     pub output: &'a [PathBuf; 2],
+    /// The store that has the other files, if no folder is shared.
+    pub away: Option<&'a Away>,
 }
 
 /// True if the part matches the journal.
@@ -50,6 +53,12 @@ fn is_whole(file: &File, part: &Needed) -> bool {
         left -= now.len();
     }
     crc.finalize() == part.place.crc
+}
+
+/// True if a file is not there, or ends too early.
+fn is_lost(error: &std::io::Error) -> bool {
+    use std::io::ErrorKind::{NotFound, UnexpectedEof};
+    matches!(error.kind(), NotFound | UnexpectedEof)
 }
 
 /// The name of the file on disk that has the part.
@@ -87,6 +96,14 @@ fn damaged(
             vec![places.folder.join(&name)]
         };
         let check = |path: &PathBuf| -> Result<Vec<Needed>> {
+            if let Some(away) = places.away.filter(|_| !is_output(&name)) {
+                let ends = parts.iter().map(|part| part.place.end().unwrap_or(0));
+                match away.bring(path, ends.max().unwrap_or(0)) {
+                    Err(e) if !is_lost(&e) => return Err(Error::io(path, "fetch", e)),
+                    // What is not there is found to be missing.
+                    _ => {}
+                }
+            }
             let Ok(file) = open_existing(path) else {
                 return Ok(parts.clone());
             };
@@ -97,6 +114,9 @@ fn damaged(
                 Ok((!whole).then(|| part.clone()))
             });
             let bad = bad.collect::<Result<Vec<_>>>()?;
+            if let Some(away) = places.away {
+                away.forget(path);
+            }
             Ok(bad.into_iter().flatten().collect())
         };
         let renamed = is_output(&name) && parts.iter().any(|part| part.section == RENAMED);
@@ -202,6 +222,7 @@ mod tests {
         let places = Whereabouts {
             folder: folder.path(),
             output: &Default::default(),
+            away: None,
         };
         let end = recover(&mut history, &places, &Silent, &Cancel::new()).unwrap();
         assert_eq!(end, Some(2));

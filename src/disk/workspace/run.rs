@@ -3,6 +3,7 @@
 //! The program is deterministic, so a resumed run is the same program again, in which finished work of the
 //! journals is skipped. A step is identified by its name and the names of the steps around it.
 
+use super::away::Away;
 use super::history::History;
 use super::journal::{self, Journal, OpenStep, Record};
 use super::keeper::{Keeper, Leaving};
@@ -16,7 +17,10 @@ use std::fs::File;
 use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicU64;
-use std::sync::{Mutex, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock};
+
+/// The stage that writes the mesh, at the beginning of the names of its steps.
+const OUTPUT_STAGE: &str = "/export/";
 
 /// The part of the work that this process does.
 #[derive(Debug)]
@@ -56,6 +60,8 @@ pub struct ResumableRun {
     touched: Mutex<HashSet<PathBuf>>,
     /// Points of the cloud, as far as they are known.
     pub points: AtomicU64,
+    /// The store that has the run, if tasks share no folder, and memory for what is fetched.
+    away: Option<(Arc<Away>, Reservation)>,
     _held: Reservation,
 }
 
@@ -93,8 +99,29 @@ impl ResumableRun {
             made: Mutex::default(),
             touched: Mutex::default(),
             points: AtomicU64::new(0),
+            away: None,
             _held: held,
         }
+    }
+
+    /// The same run, in a store.
+    #[must_use]
+    pub fn with_away(mut self, away: Option<(Arc<Away>, Reservation)>) -> Self {
+        self.away = away;
+        self
+    }
+
+    /// The store that has the run, if tasks share no folder.
+    #[must_use]
+    pub fn away(&self) -> Option<&Away> {
+        self.away.as_ref().map(|(away, _)| &**away)
+    }
+
+    /// The store that has a segment, if it is not one of this process.
+    #[must_use]
+    pub fn away_of(&self, segment: u32) -> Option<&Away> {
+        let own = self.first..=self.first.saturating_add(self.workers.len() as u32);
+        self.away().filter(|_| !own.contains(&segment))
     }
 
     /// True if tasks share the run.
@@ -114,6 +141,8 @@ impl ResumableRun {
     #[must_use]
     pub fn shared_units(&self, step: &str, units: u64, left: &[usize]) -> Option<Range<u64>> {
         match &self.role {
+            // The output is a file that this process alone sees.
+            Role::Between if self.away.is_some() && step.starts_with(OUTPUT_STAGE) => None,
             Role::Between if !left.is_empty() => {
                 let step = step.to_owned();
                 lock(&self.open).push(OpenStep { step, units });

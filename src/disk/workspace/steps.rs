@@ -33,6 +33,32 @@ impl<S: Into<String>> From<(S, &'static str)> for UnitsName {
     }
 }
 
+/// What the work on a unit made, whatever its type.
+trait Outcome {
+    /// What a resumed run reads in the place of doing the unit: its progress, and the value.
+    fn payload(&self, workspace: &Workspace, items: u64) -> Result<Vec<u8>>;
+
+    /// Gives the value to the caller of [`Workspace::units`].
+    fn hand_on(self: Box<Self>, unit: usize) -> Result<()>;
+}
+
+struct Done<'a, T, F> {
+    value: T,
+    hand_on: &'a F,
+}
+
+impl<T: Serialize, F: Fn(usize, T) -> Result<()>> Outcome for Done<'_, T, F> {
+    fn payload(&self, workspace: &Workspace, items: u64) -> Result<Vec<u8>> {
+        workspace.saved(&(items, &self.value))
+    }
+
+    fn hand_on(self: Box<Self>, unit: usize) -> Result<()> {
+        (self.hand_on)(unit, self.value)
+    }
+}
+
+type Work<'a> = dyn Fn(&Unit<'_>) -> Result<Box<dyn Outcome + 'a>> + Sync + 'a;
+
 /// Inside a step until it is dropped.
 struct Inside<'a>(&'a ResumableRun);
 
@@ -128,10 +154,29 @@ impl Workspace {
     ) -> Result<()> {
         let each = Mutex::new(each);
         let hand_on = |unit, value| (*lock(&each))(unit, value);
-        let UnitsName { step, memory } = name.into();
+        let work = |unit: &Unit<'_>| -> Result<Box<dyn Outcome + '_>> {
+            let (value, hand_on) = (work(unit)?, &hand_on);
+            Ok(Box::new(Done { value, hand_on }))
+        };
+        self.units_of(name.into(), count, &bytes, &work, &|unit, payload| {
+            let (items, value) = self.restored(payload)?;
+            self.observer.advance(items);
+            hand_on(unit, value)
+        })
+    }
+
+    /// [`Workspace::units`], compiled once for all kinds of work; `restore` takes the payload of a finished unit.
+    fn units_of(
+        &self,
+        UnitsName { step, memory }: UnitsName,
+        count: usize,
+        bytes: &(dyn Fn(usize) -> u64 + Sync),
+        work: &Work<'_>,
+        restore: &dyn Fn(usize, &[u8]) -> Result<()>,
+    ) -> Result<()> {
         let Some(run) = self.run() else {
             return self.for_each_unit(memory, count, bytes, |unit| {
-                hand_on(unit.number(), work(unit)?)
+                work(unit)?.hand_on(unit.number())
             });
         };
         let step = run.begin(&step)?;
@@ -144,25 +189,17 @@ impl Workspace {
         }
         // Whoever does some units of a step does not need the results of the others.
         for unit in done.into_iter().filter(|_| shared.is_none()) {
-            let payload = run.payload(&step, unit as u64)?.unwrap_or_default();
-            let (items, value) = self.restored(&payload)?;
-            self.observer.advance(items);
-            hand_on(unit, value)?;
+            restore(unit, &run.payload(&step, unit as u64)?.unwrap_or_default())?;
         }
         let files = Mutex::new(BTreeSet::new());
-        self.for_units(memory, &left, bytes, |unit| {
-            let value = work(&unit)?;
+        self.for_units(memory, &left, bytes, &|unit| {
             let (number, worker) = (unit.number(), unit.worker());
+            let outcome = work(&unit)?;
             let (Notes { puts, items }, usage) = unit.end();
             lock(&files).extend(puts.iter().map(|put| put.file.clone()));
-            run.finish(
-                worker,
-                &step,
-                number as u64,
-                puts,
-                self.saved(&(items, &value))?,
-            )?;
-            hand_on(number, value)?;
+            let payload = outcome.payload(self, items)?;
+            run.finish(worker, &step, number as u64, puts, payload)?;
+            outcome.hand_on(number)?;
             Ok(usage)
         })?;
         if shared.is_some() {

@@ -24,16 +24,20 @@ impl Workspace {
         work: impl Fn(&Unit<'_>) -> Result<()> + Sync,
     ) -> Result<()> {
         let all: Vec<usize> = (0..count).collect();
-        self.for_units(name, &all, bytes, |unit| Ok((work(&unit)?, unit.end().1).1))
+        self.for_units(name, &all, &bytes, &|unit| {
+            work(&unit)?;
+            Ok(unit.end().1)
+        })
     }
 
-    /// As [`Workspace::for_each_unit`], for the `units` with these numbers; `work` ends the unit.
+    /// As [`Workspace::for_each_unit`], for the `units` with these numbers; `work` ends the unit. Compiled once
+    /// for all kinds of work.
     pub(super) fn for_units(
         &self,
         name: &'static str,
         units: &[usize],
-        bytes: impl Fn(usize) -> u64 + Sync,
-        work: impl Fn(Unit<'_>) -> Result<Usage> + Sync,
+        bytes: &(dyn Fn(usize) -> u64 + Sync),
+        work: &(dyn Fn(Unit<'_>) -> Result<Usage> + Sync),
     ) -> Result<()> {
         let next = AtomicUsize::new(0);
         let stop = AtomicBool::new(false);

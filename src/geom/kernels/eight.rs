@@ -44,6 +44,15 @@ pub trait Eight: Numbers {
         self.store(&mut p);
         ((p[0] + p[4]) + (p[2] + p[6])) + ((p[1] + p[5]) + (p[3] + p[7]))
     }
+    /// The sums of the numbers of several vectors, from their first and last parts, each as [`Eight::total`].
+    #[inline(always)]
+    fn totals<const N: usize>(first: [Self::Part; N], last: [Self::Part; N]) -> [f64; N] {
+        let mut totals = [0.0; N];
+        for ((total, first), last) in totals.iter_mut().zip(first).zip(last) {
+            *total = Self::of_parts(first, last).total();
+        }
+        totals
+    }
 }
 
 /// Vectors from arrays.

@@ -81,13 +81,16 @@ impl Level {
     /// All levels of this machine, narrowest first.
     #[must_use]
     pub fn all() -> Vec<Self> {
-        let mut all = vec![Self::BASE];
         #[cfg(target_arch = "x86_64")]
-        {
-            all.extend(avx2().then_some(Self(Width::Avx2)));
-            all.extend(avx512().then_some(Self(Width::Avx512)));
-        }
-        all
+        let wide = [
+            avx2().then_some(Self(Width::Avx2)),
+            avx512().then_some(Self(Width::Avx512)),
+        ];
+        #[cfg(not(target_arch = "x86_64"))]
+        let wide: [Option<Self>; 0] = [];
+        std::iter::once(Self::BASE)
+            .chain(wide.into_iter().flatten())
+            .collect()
     }
 }
 

@@ -30,7 +30,7 @@ pub struct Weighted {
     at: [Vec<[f64; GROUP]>; 3],
     /// The weight by distance, 1 − (x² + y² + z²).
     near: Vec<[f64; GROUP]>,
-    /// The same, or 0 for positions that [`drop_beyond`] took out.
+    /// The weights of [`drop_beyond`] or [`fade`].
     kept: Vec<[f64; GROUP]>,
 }
 
@@ -53,8 +53,8 @@ fn put_totals<F: Eight, const N: usize>(
     to: &mut LaneSums<N>,
     lane: usize,
 ) {
-    for ((to, first), last) in to.iter_mut().zip(first).zip(last) {
-        to[lane] = F::of_parts(first, last).total();
+    for (to, total) in to.iter_mut().zip(F::totals(first, last)) {
+        to[lane] = total;
     }
 }
 
@@ -150,37 +150,43 @@ fn add<F: Numbers, const N: usize>(sums: &mut [F; N], terms: [F; N]) {
     }
 }
 
-/// The terms of a group of positions in the sums of a surface.
+/// Adds the terms of a group of positions to the sums of a surface. Each product is added as soon as it is known,
+/// and the last ones first, so that few of them are in registers at a time beside the sums.
 #[inline(always)]
-fn surface_terms<F: Numbers>(u: F, v: F, h: F, w: F) -> [F; 23] {
-    let [wu, wv, wh] = [w * u, w * v, w * h];
-    let [wuu, wuv, wvv] = [wu * u, wu * v, wv * v];
-    let [wuuu, wuuv, wuvv, wvvv] = [wuu * u, wuu * v, wvv * u, wvv * v];
-    [
-        w,
-        wu,
-        wv,
-        wuu,
-        wuv,
-        wvv,
-        wuuu,
-        wuuv,
-        wuvv,
-        wvvv,
-        wuuu * u,
-        wuuu * v,
-        wuuv * v,
-        wuvv * v,
-        wvvv * v,
-        wh,
-        wu * h,
-        wv * h,
-        wuu * h,
-        wuv * h,
-        wvv * h,
-        wh * h,
-        w * w,
-    ]
+fn add_surface_terms<F: Numbers>(s: &mut [F; 23], [u, v, h]: [F; 3], w: F) {
+    s[0] = s[0] + w;
+    s[22] = s[22] + w * w;
+    let wh = w * h;
+    s[15] = s[15] + wh;
+    s[21] = s[21] + wh * h;
+    let wu = w * u;
+    s[1] = s[1] + wu;
+    s[16] = s[16] + wu * h;
+    let wuu = wu * u;
+    s[3] = s[3] + wuu;
+    s[18] = s[18] + wuu * h;
+    let wuuu = wuu * u;
+    s[6] = s[6] + wuuu;
+    s[10] = s[10] + wuuu * u;
+    s[11] = s[11] + wuuu * v;
+    let wuuv = wuu * v;
+    s[7] = s[7] + wuuv;
+    s[12] = s[12] + wuuv * v;
+    let wuv = wu * v;
+    s[4] = s[4] + wuv;
+    s[19] = s[19] + wuv * h;
+    let wv = w * v;
+    s[2] = s[2] + wv;
+    s[17] = s[17] + wv * h;
+    let wvv = wv * v;
+    s[5] = s[5] + wvv;
+    s[20] = s[20] + wvv * h;
+    let wuvv = wvv * u;
+    s[8] = s[8] + wuvv;
+    s[13] = s[13] + wuvv * v;
+    let wvvv = wvv * v;
+    s[9] = s[9] + wvvv;
+    s[14] = s[14] + wvvv * v;
 }
 
 kernel! {
@@ -206,37 +212,20 @@ fn turn_body<F: Eight>(
         (x * v[0] + y * v[1] + z * v[2]).store(to_y);
         (x * h[0] + y * h[1] + z * h[2]).store(to_z);
     }
-    put_surface_sums::<F>(&all.at, &all.near, &Same, sums, lane);
+    put_surface_sums::<F, false>(&all.at, &all.near, sums, lane);
 }
 
-/// How a position's weight follows from the one in the column. (A trait, since a closure would not be compiled
-/// for the level.)
-trait Weigh<F> {
-    fn weigh(&self, u: F, v: F, h: F, w: F) -> F;
-}
-
-/// The weight in the column.
-struct Same;
-
-impl<F> Weigh<F> for Same {
-    #[inline(always)]
-    fn weigh(&self, _: F, _: F, _: F, w: F) -> F {
-        w
-    }
-}
-
-/// Writes the sums with weights from a column to a lane.
+/// Writes the sums with weights from a column, or with their squares, to a lane.
 #[inline(always)]
-fn put_surface_sums<F: Eight>(
+fn put_surface_sums<F: Eight, const SQUARES: bool>(
     at: &[Vec<[f64; GROUP]>; 3],
     weights: &[[f64; GROUP]],
-    weigh: &impl Weigh<F::Part>,
     sums: &mut SurfaceSums,
     lane: usize,
 ) {
-    let first = surface_sums::<F>(at, weights, weigh, 0);
+    let first = surface_sums::<F, SQUARES>(at, weights, 0);
     let last = if F::PARTS > 1 {
-        surface_sums::<F>(at, weights, weigh, 1)
+        surface_sums::<F, SQUARES>(at, weights, 1)
     } else {
         first
     };
@@ -245,17 +234,17 @@ fn put_surface_sums<F: Eight>(
 
 /// The sums over one part of each group.
 #[inline(always)]
-fn surface_sums<F: Eight>(
+fn surface_sums<F: Eight, const SQUARES: bool>(
     [u, v, h]: &[Vec<[f64; GROUP]>; 3],
     weights: &[[f64; GROUP]],
-    weigh: &impl Weigh<F::Part>,
     part: usize,
 ) -> [F::Part; 23] {
     let mut s = [F::Part::splat(0.0); 23];
     for (((u, v), h), w) in u.iter().zip(v).zip(h).zip(weights) {
         let (u, v) = (F::load_part(u, part), F::load_part(v, part));
         let (h, w) = (F::load_part(h, part), F::load_part(w, part));
-        add(&mut s, surface_terms(u, v, h, weigh.weigh(u, v, h, w)));
+        let w = if SQUARES { w * w } else { w };
+        add_surface_terms(&mut s, [u, v, h], w);
     }
     s
 }
@@ -299,7 +288,7 @@ fn drop_body<F: Eight>(
         any |= beyond;
     }
     if any != 0 {
-        put_surface_sums::<F>(&all.at, &all.kept, &Same, sums, lane);
+        put_surface_sums::<F, false>(&all.at, &all.kept, sums, lane);
     }
     any != 0
 }
@@ -311,23 +300,14 @@ kernel! {
 
 #[inline(always)]
 fn square_body<F: Eight>(all: &Weighted, sums: &mut SurfaceSums, lane: usize) {
-    put_surface_sums::<F>(&all.at, &all.near, &Square, sums, lane);
-}
-
-struct Square;
-
-impl<F: Numbers> Weigh<F> for Square {
-    #[inline(always)]
-    fn weigh(&self, _: F, _: F, _: F, w: F) -> F {
-        w * w
-    }
+    put_surface_sums::<F, true>(&all.at, &all.near, sums, lane);
 }
 
 kernel! {
     /// Writes the sums with the squares of the weights by distance, multiplied by the square of 1 − (squared
     /// height over a surface) / `limit`, or by 0 where that is negative, to a lane.
     pub fn fade(
-        all: &Weighted,
+        all: &mut Weighted,
         surface: &[f64; 6],
         limit: f64,
         sums: &mut SurfaceSums,
@@ -337,30 +317,24 @@ kernel! {
 
 #[inline(always)]
 fn fade_body<F: Eight>(
-    all: &Weighted,
+    all: &mut Weighted,
     surface: &[f64; 6],
     limit: f64,
     sums: &mut SurfaceSums,
     lane: usize,
 ) {
-    let (surface, part) = (splat(surface), F::Part::splat(1.0 / limit));
-    let fade = Fade { surface, part };
-    put_surface_sums::<F>(&all.at, &all.near, &fade, sums, lane);
-}
-
-struct Fade<F> {
-    surface: [F; 6],
-    /// 1 / limit.
-    part: F,
-}
-
-impl<F: Numbers> Weigh<F> for Fade<F> {
-    #[inline(always)]
-    fn weigh(&self, u: F, v: F, h: F, w: F) -> F {
-        let off = over(&self.surface, u, v, h);
-        let rest = (F::splat(1.0) - off * off * self.part).larger(F::splat(0.0));
-        w * w * (rest * rest)
+    let (c, part) = (splat(surface), F::splat(1.0 / limit));
+    let (one, none) = (F::splat(1.0), F::splat(0.0));
+    let [u, v, h] = &all.at;
+    // The weights first: together with the sums they do not fit the registers.
+    let weights = all.near.iter().zip(&mut all.kept);
+    for (((u, v), h), (near, kept)) in u.iter().zip(v).zip(h).zip(weights) {
+        let (u, v, h, w) = (F::load(u), F::load(v), F::load(h), F::load(near));
+        let off = over(&c, u, v, h);
+        let rest = (one - off * off * part).larger(none);
+        (w * w * (rest * rest)).store(kept);
     }
+    put_surface_sums::<F, false>(&all.at, &all.kept, sums, lane);
 }
 
 #[cfg(test)]

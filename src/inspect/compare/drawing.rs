@@ -7,7 +7,7 @@ use outcrop_disk::error::Result;
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::memory::Reservation;
 use outcrop_draw::histogram::{Histogram, Tally};
-use outcrop_draw::picture::{Canvas, OBLIQUE, Picture, TOP, canvas_bytes};
+use outcrop_draw::picture::{Canvas, OBLIQUE, Picture, TOP, Tone, canvas_bytes};
 use outcrop_geom::vector::{Box3, V3, sub};
 use outcrop_raster::View;
 use rayon::prelude::*;
@@ -20,6 +20,9 @@ const FRAMING: usize = 4096;
 
 /// Side of a sample or a point in pixels.
 const POINT: f64 = 1.6;
+
+/// Largest side of a place of a map in pixels.
+const WIDEST: f64 = 24.0;
 
 /// Pixels by which samples are in front of the surface on which they lie.
 const LIFT: f64 = 1.5;
@@ -40,7 +43,7 @@ pub(crate) struct Sketch {
 
 impl Sketch {
     /// Draws the surface of a shape, if it has one.
-    pub(super) fn of(shape: &Shape, workspace: &Workspace) -> Result<Self> {
+    pub(crate) fn of(shape: &Shape, workspace: &Workspace) -> Result<Self> {
         let bytes = VIEWS.len() as u64 * canvas_bytes();
         let held = workspace.reserve("draw: pictures", bytes + (FRAMING * 100) as u64)?;
         let (min, max) = (shape.side.min, shape.side.max);
@@ -70,10 +73,20 @@ impl Sketch {
     /// Draws a sample, whose distance is compared with the `diagonal` of the shape.
     pub(super) fn sample(&self, p: V3, distance: f64, diagonal: f64) {
         let p = sub(p, self.middle);
-        let share = 1.0 + libm::log10(distance / diagonal) / DECADES;
-        let share = if share.is_finite() { share } else { 0.0 };
+        let share = share(distance, diagonal);
         for canvas in &self.canvases {
             canvas.point(p, POINT, share, LIFT);
+        }
+    }
+
+    /// Draws a place on a map of change, where this much changed; `spacing` is the distance of such places.
+    pub(crate) fn change(&self, p: V3, tone: Tone, [change, diagonal]: [f64; 2], spacing: f64) {
+        let p = sub(p, self.middle);
+        let share = share(change, diagonal);
+        for canvas in &self.canvases {
+            // Places next to each other touch.
+            let size = (1.25 * spacing * canvas.pixels()).clamp(POINT, WIDEST);
+            canvas.change(p, size, (tone, share), LIFT);
         }
     }
 
@@ -84,7 +97,7 @@ impl Sketch {
     }
 
     /// The pictures, with the name of the shape; samples as far as `top` have the last colour of the scale.
-    pub(super) fn pictures(
+    pub(crate) fn pictures(
         &self,
         name: &str,
         (diagonal, top): (f64, f64),
@@ -102,6 +115,12 @@ impl Sketch {
             views.map(picture).collect()
         })
     }
+}
+
+/// A distance on the scale on which distances are kept.
+fn share(distance: f64, diagonal: f64) -> f64 {
+    let share = 1.0 + libm::log10(distance / diagonal) / DECADES;
+    if share.is_finite() { share } else { 0.0 }
 }
 
 /// A position of an item of some pages.

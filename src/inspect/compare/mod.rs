@@ -22,9 +22,9 @@ mod drawing;
 mod figures;
 mod measure;
 mod mesh;
-mod pages;
+pub(crate) mod pages;
 mod samples;
-mod shape;
+pub(crate) mod shape;
 #[cfg(test)]
 mod tests;
 mod triangles;
@@ -36,14 +36,15 @@ pub use figures::{Comparison, Distances, Figures};
 pub use shape::{Kind, Side};
 
 #[cfg(feature = "pictures")]
-use drawing::{Drawing, Sketch};
+use drawing::Drawing;
+#[cfg(feature = "pictures")]
+pub(crate) use drawing::Sketch;
 use figures::Sums;
 use outcrop_codecs::ply_mesh::{PlyMesh, holds_faces};
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::Workspace;
 #[cfg(feature = "pictures")]
 use outcrop_draw::picture::Picture;
-use outcrop_geom::vector::Box3;
 use samples::Numbers;
 use shape::Shape;
 use std::path::Path;
@@ -67,7 +68,7 @@ impl Default for Options {
 }
 
 /// Reads a mesh or a cloud; `name` distinguishes the scratch files of the two sides.
-fn read_side(
+pub(crate) fn read_side(
     path: &Path,
     name: &'static str,
     options: &Options,
@@ -163,8 +164,7 @@ fn measured<W: Witness>(
     let bytes = number * size_of::<DistanceRow>() as u64;
     let buffer = bytes.min(workspace.memory.available() / 8) + (1 << 20);
     let (sorter, _held) = triangles::sorter(workspace, "compare.distances", buffer)?;
-    let (min, max) = (a.side.min, a.side.max);
-    let diagonal = Box3 { min, max }.diagonal();
+    let diagonal = a.side.bounds().diagonal();
     let mut witness = begin(&a, &b, diagonal)?;
     let mut sums = [Sums::default(); 2];
     for (way, (from, to)) in [(&a, &b), (&b, &a)].into_iter().enumerate() {

@@ -34,7 +34,7 @@ const TOGETHER: usize = 32;
 const MOST_NEAR: usize = 64;
 
 /// An item with a distance from a point.
-pub(super) trait Item: Row {
+pub(crate) trait Item: Row {
     fn bounds(&self) -> Box3;
     fn distance2(&self, p: V3) -> f64;
 
@@ -45,8 +45,12 @@ pub(super) trait Item: Row {
 }
 
 impl Item for V3 {
+    #[inline]
     fn bounds(&self) -> Box3 {
-        Box3::of(&[*self])
+        Box3 {
+            min: *self,
+            max: *self,
+        }
     }
 
     fn distance2(&self, p: V3) -> f64 {
@@ -56,8 +60,14 @@ impl Item for V3 {
 }
 
 impl Item for [V3; 3] {
+    #[inline]
     fn bounds(&self) -> Box3 {
-        Box3::of(self)
+        // Not `Box3::of`, which is no part of the inner loop here.
+        let [a, b, c] = self;
+        Box3 {
+            min: std::array::from_fn(|k| a[k].min(b[k]).min(c[k])),
+            max: std::array::from_fn(|k| a[k].max(b[k]).max(c[k])),
+        }
     }
 
     fn distance2(&self, p: V3) -> f64 {
@@ -71,7 +81,7 @@ impl Item for [V3; 3] {
 
 /// Pages of items.
 #[derive(Debug)]
-pub(super) struct Pages<T: Row> {
+pub(crate) struct Pages<T: Row> {
     stored: LocalTable<T>,
     /// The boxes around the pages.
     tree: BoxTree<f64>,
@@ -82,23 +92,23 @@ pub(super) struct Pages<T: Row> {
 
 impl<T: Item> Pages<T> {
     /// The box around all items.
-    pub(super) fn bounds(&self) -> Box3 {
+    pub(crate) fn bounds(&self) -> Box3 {
         self.bounds
     }
 
     /// Number of pages.
-    pub(super) fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.stored.count()
     }
 
     /// Bytes of a page in memory, with those for reading it.
-    pub(super) fn page_bytes(&self) -> u64 {
+    pub(crate) fn page_bytes(&self) -> u64 {
         let boxes = self.page.div_ceil(LEAF) * size_of::<Box3>();
         (2 * self.page * size_of::<T>() + boxes + 128) as u64
     }
 
     /// Calls `each` with the items of every page, in order.
-    pub(super) fn for_each_page(&self, mut each: impl FnMut(&[T]) -> Result<()>) -> Result<()> {
+    pub(crate) fn for_each_page(&self, mut each: impl FnMut(&[T]) -> Result<()>) -> Result<()> {
         let mut items = Vec::new();
         for page in 0..self.count() {
             self.stored.get_into(page, &mut items)?;
@@ -152,7 +162,7 @@ impl<T: Item> Pages<T> {
 
     /// The squared distances from positions to the nearest item, in their order; infinite if there is none.
     /// Positions that follow each other should be near each other: the tree is queried once for a run of them.
-    pub(super) fn distances2(
+    pub(crate) fn distances2(
         &self,
         positions: &[V3],
         searcher: &mut Searcher<T>,
@@ -191,6 +201,33 @@ impl<T: Item> Pages<T> {
             }
         }
         Ok(found)
+    }
+
+    /// Calls `each` with all items whose boxes meet another one, in their order.
+    pub(crate) fn meeting(
+        &self,
+        around: &Box3,
+        searcher: &mut Searcher<T>,
+        mut each: impl FnMut(&T),
+    ) -> Result<()> {
+        let Searcher { cache, near } = searcher;
+        let meets = |Box3 { min, max }: &Box3| {
+            let mut axes = min.iter().zip(max).zip(around.min.iter().zip(&around.max));
+            axes.all(|((min, max), (low, high))| min <= high && low <= max)
+        };
+        near.clear();
+        near.extend(self.tree.that(|min, max| meets(&Box3 { min, max })));
+        near.sort_unstable_by_key(|(page, _)| *page);
+        for (page, _) in &*near {
+            let page = cache.page(self, *page)?;
+            for (leaf, bounds) in page.items.chunks(LEAF).zip(&page.boxes) {
+                if meets(bounds) {
+                    let items = leaf.iter().filter(|item| meets(&item.bounds()));
+                    items.for_each(&mut each);
+                }
+            }
+        }
+        Ok(())
     }
 
     /// The nearest item of the page whose box is nearest to the first position.
@@ -266,7 +303,7 @@ impl<T> Page<T> {
 
 /// The pages at hand and the buffer of one thread for its searches.
 #[derive(Debug)]
-pub(super) struct Searcher<T> {
+pub(crate) struct Searcher<T> {
     cache: Cache<T>,
     /// Pages near a run of positions, with their lowest and highest corners.
     near: Vec<(usize, [V3; 2])>,
@@ -274,7 +311,7 @@ pub(super) struct Searcher<T> {
 
 impl<T> Searcher<T> {
     /// Keeps at most `most` pages in memory.
-    pub(super) fn new(most: usize) -> Self {
+    pub(crate) fn new(most: usize) -> Self {
         Self {
             cache: Cache::new(most),
             near: Vec::new(),
@@ -315,7 +352,7 @@ impl<T> Cache<T> {
 
 /// Writes [`Pages`] in order.
 #[derive(Debug)]
-pub(super) struct PageWriter<T: Row> {
+pub(crate) struct PageWriter<T: Row> {
     stored: LocalTable<T>,
     page: usize,
     pending: Vec<T>,
@@ -325,7 +362,7 @@ pub(super) struct PageWriter<T: Row> {
 
 impl<T: Item> PageWriter<T> {
     /// Starts the scratch file `name` for `count` items.
-    pub(super) fn new(workspace: &Workspace, name: &str, count: u64) -> Result<Self> {
+    pub(crate) fn new(workspace: &Workspace, name: &str, count: u64) -> Result<Self> {
         let page = count.div_ceil(MOST_PAGES).max(LEAST) as usize;
         let pages = count.div_ceil(page as u64);
         // The boxes are dropped before the tree grows to its size.
@@ -339,7 +376,7 @@ impl<T: Item> PageWriter<T> {
         })
     }
 
-    pub(super) fn push(&mut self, item: T) -> Result<()> {
+    pub(crate) fn push(&mut self, item: T) -> Result<()> {
         self.pending.push(item);
         if self.pending.len() == self.page {
             self.flush()?;
@@ -356,7 +393,7 @@ impl<T: Item> PageWriter<T> {
         Ok(())
     }
 
-    pub(super) fn finish(mut self) -> Result<Pages<T>> {
+    pub(crate) fn finish(mut self) -> Result<Pages<T>> {
         if !self.pending.is_empty() {
             self.flush()?;
         }

@@ -32,6 +32,16 @@ pub struct Side {
     pub exact: bool,
 }
 
+impl Side {
+    /// The box around the shape.
+    pub(crate) fn bounds(&self) -> Box3 {
+        Box3 {
+            min: self.min,
+            max: self.max,
+        }
+    }
+}
+
 /// Mesh or cloud.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -43,14 +53,14 @@ pub enum Kind {
 }
 
 /// One side, ready for sampling and measuring.
-pub(super) struct Shape {
+pub(crate) struct Shape {
     /// Begins the names of its scratch files.
-    pub(super) name: &'static str,
-    pub(super) side: Side,
-    pub(super) items: Items,
+    pub(crate) name: &'static str,
+    pub(crate) side: Side,
+    pub(crate) items: Items,
 }
 
-pub(super) enum Items {
+pub(crate) enum Items {
     Mesh {
         triangles: Pages<[V3; 3]>,
         /// Vertices chosen as samples.
@@ -74,7 +84,7 @@ pub(super) fn side(path: &Path, kind: Kind, bounds: Box3) -> Side {
 }
 
 /// True if distances from this position can be computed.
-pub(super) fn usable(p: V3) -> bool {
+pub(crate) fn usable(p: V3) -> bool {
     p.iter().all(|c| c.abs() <= LARGEST)
 }
 

@@ -327,7 +327,7 @@ impl<'a> MeshFile<'a> {
                 Ok(())
             })?;
             fault::point(Event::Rename);
-            match std::fs::rename(&self.temporary, &self.output) {
+            match outcrop_platform::rename(&self.temporary, &self.output) {
                 // Another process may have done it.
                 Err(e) if e.kind() == NotFound && self.workspace.is_shared() => {}
                 done => {

@@ -307,7 +307,7 @@ impl Split<'_> {
 
     fn rename(&self, path: &Path) -> Result<()> {
         fault::point(Event::Rename);
-        match std::fs::rename(self.temporary(path), path) {
+        match outcrop_platform::rename(&self.temporary(path), path) {
             // An earlier attempt did it, and its file was verified.
             Err(e) if e.kind() == NotFound && path.exists() => {}
             done => done.map_err(|e| Error::io(path, "rename the finished file to it", e))?,

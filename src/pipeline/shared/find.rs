@@ -2,6 +2,8 @@
 //! the folder for scratch files.
 
 use super::super::start::scratch_folder;
+use super::place;
+use crate::deliver::SCRATCH;
 use outcrop_disk::error::{Error, Remedy, Result};
 use outcrop_disk::workspace::generations::SharedFolder;
 use outcrop_mesh_files::export::folder_of;
@@ -9,9 +11,6 @@ use outcrop_platform::{path_bytes, path_of_bytes};
 use std::ffi::{OsStr, OsString};
 use std::io::Read;
 use std::path::{Path, PathBuf};
-
-/// Ending of the names of scratch folders.
-const ENDING: &str = ".outcrop-scratch";
 
 /// Most bytes of a path in a file.
 const LONGEST: u64 = 16 << 10;
@@ -31,7 +30,10 @@ pub(super) fn note(mesh: &Path, folder: &Path) -> Result<()> {
         return Ok(());
     }
     let path = note_of(mesh);
-    let whole = std::path::absolute(folder).map_err(|e| Error::io(folder, "find", e))?;
+    let whole = match place::is_store(folder) {
+        true => folder.to_path_buf(),
+        false => std::path::absolute(folder).map_err(|e| Error::io(folder, "find", e))?,
+    };
     let bytes = [&path_bytes(&whole)[..], b"\n"].concat();
     std::fs::write(&path, bytes).map_err(|e| Error::io(&path, "write", e))
 }
@@ -56,12 +58,16 @@ fn noted(mesh: &Path) -> Option<PathBuf> {
 /// # Errors
 /// [`Error::NotResumable`] if no run or several are there; [`Error::Io`].
 pub fn shared_folder(given: &Path) -> Result<PathBuf> {
+    if place::is_store(given) {
+        return in_store(given);
+    }
     let mut named = vec![given.to_path_buf()];
     if given.file_name().is_some() {
         named.push(scratch_folder(given, None));
         named.extend(noted(given));
     }
-    if let Some(found) = named.into_iter().find(|path| SharedFolder::is_at(path)) {
+    let is_at = |path: &PathBuf| place::is_store(path) || SharedFolder::is_at(path);
+    if let Some(found) = named.into_iter().find(is_at) {
         return Ok(found);
     }
     let not = |why: String| Error::not_resumable(given, why);
@@ -73,17 +79,40 @@ pub fn shared_folder(given: &Path) -> Result<PathBuf> {
         return Err(none());
     }
     let name = given.file_name().map(OsStr::to_string_lossy);
-    if !given.is_dir() || name.is_some_and(|name| name.ends_with(ENDING)) {
+    if !given.is_dir() || name.is_some_and(|name| name.ends_with(SCRATCH)) {
         // What opens it tells what it is.
         return Ok(given.to_path_buf());
     }
     let entries = std::fs::read_dir(given).map_err(|e| Error::io(given, "list", e))?;
     let folders = entries.flatten().map(|entry| entry.path());
-    let mut runs: Vec<PathBuf> = folders.filter(|path| SharedFolder::is_at(path)).collect();
+    let runs: Vec<PathBuf> = folders.filter(|path| SharedFolder::is_at(path)).collect();
+    only(given, runs)
+}
+
+/// The run that a URL names: its own, or that of a prefix in which there is one.
+fn in_store(given: &Path) -> Result<PathBuf> {
+    let text = given.to_string_lossy();
+    let given = Path::new(text.trim_end_matches('/'));
+    if given.to_string_lossy().ends_with(SCRATCH) {
+        return Ok(given.to_path_buf());
+    }
+    let names = place::names(given)?.into_iter();
+    let runs = names.filter(|name| name.ends_with(SCRATCH));
+    only(
+        given,
+        runs.map(|name| place::below(given, name.as_ref()))
+            .collect(),
+    )
+}
+
+/// The only one of the runs in a folder.
+fn only(given: &Path, mut runs: Vec<PathBuf>) -> Result<PathBuf> {
+    let not = |why: String| Error::not_resumable(given, why);
     runs.sort();
     match &runs[..] {
         [one] => Ok(one.clone()),
-        [] => Err(none()),
+        [] => Err(not("no run that tasks share is here".into())
+            .with(Remedy::Command("plan", "to begin one"))),
         several => {
             let names = several.iter().filter_map(|path| path.file_name());
             let names: Vec<_> = names.map(OsStr::to_string_lossy).collect();

@@ -1,7 +1,9 @@
 //! The state of a run that tasks share, for people and scripts.
 
+use super::place::{self, Copies};
 use crate::pipeline::manifest::Manifest;
 use outcrop_disk::error::Result;
+use outcrop_disk::workspace::away::Traffic;
 use outcrop_disk::workspace::generations::{Attempts, Generation, Shard, SharedFolder};
 use outcrop_disk::workspace::journal::{OpenStep, Took};
 use serde::{Deserialize, Serialize};
@@ -120,6 +122,8 @@ pub struct Totals {
     pub bytes_read: u64,
     /// Bytes that all processes wrote.
     pub bytes_written: u64,
+    /// What was asked of the store of a run that is in one, without the journals at the ends of processes.
+    pub store: Traffic,
 }
 
 impl Totals {
@@ -143,6 +147,9 @@ impl Totals {
             *resident = took.resident.max(*resident);
             totals.bytes_read += took.read;
             totals.bytes_written += took.written;
+            totals.store.requests += took.traffic.requests;
+            totals.store.fetched += took.traffic.fetched;
+            totals.store.sent += took.traffic.sent;
         }
         totals
     }
@@ -226,7 +233,7 @@ impl Status {
 /// # Errors
 /// [`crate::Error::NotResumable`], [`crate::Error::Io`], [`crate::Error::Corrupt`].
 pub fn status(path: &Path) -> Result<Status> {
-    let folder = SharedFolder::open(path)?;
+    let folder = place::open(path, &Copies::default())?;
     let manifest = Manifest::from_bytes(path, &folder.manifest)?;
     let generation = folder.read(folder.newest()?)?;
     let now = SystemTime::now();

@@ -145,6 +145,25 @@ impl Stages<'_> {
         Ok(())
     }
 
+    /// Sends the output to a store, if it is behind a URL.
+    pub fn deliver(&mut self) -> Result<()> {
+        let (job, workspace) = (self.job, self.workspace);
+        let Some(delivery) = &job.delivery else {
+            return Ok(());
+        };
+        workspace.trim();
+        let mut warnings = Vec::new();
+        let send = || {
+            let sent = delivery.send(workspace, &mut |warning| warnings.push(warning))?;
+            Ok((sent, std::mem::take(&mut warnings)))
+        };
+        let bytes = delivery.bytes()?;
+        let (sent, warnings) = self.clock.stage("upload", "bytes", bytes, send)?;
+        self.report.uploaded = Some(sent);
+        warnings.into_iter().for_each(|warning| self.warn(warning));
+        Ok(())
+    }
+
     /// Levels of detail of the mesh, if they are wanted.
     pub fn levels(&mut self) -> Result<()> {
         let (job, workspace) = (self.job, self.workspace);

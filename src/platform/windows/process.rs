@@ -38,14 +38,22 @@ pub fn memory_allowed() -> u64 {
     // SAFETY: the answer has the room that is told; without a handle the job is that of this process.
     let found =
         check(unsafe { QueryInformationJobObject(none, class, to, bytes, none.cast()) }).is_ok();
+    match found {
+        true => allowed(&limits, physical()),
+        false => physical(),
+    }
+}
+
+/// The smallest of the bytes of memory of the machine and those limits of a job that are in force.
+fn allowed(limits: &JOBOBJECT_EXTENDED_LIMIT_INFORMATION, physical: u64) -> u64 {
     let flags = limits.BasicLimitInformation.LimitFlags;
     [
         (JOB_OBJECT_LIMIT_PROCESS_MEMORY, limits.ProcessMemoryLimit),
         (JOB_OBJECT_LIMIT_JOB_MEMORY, limits.JobMemoryLimit),
     ]
     .into_iter()
-    .filter(|(flag, _)| found && flags & flag != 0)
-    .fold(physical(), |least, (_, bytes)| least.min(bytes as u64))
+    .filter(|(flag, _)| flags & flag != 0)
+    .fold(physical, |least, (_, bytes)| least.min(bytes as u64))
 }
 
 fn memory() -> PROCESS_MEMORY_COUNTERS {
@@ -131,4 +139,26 @@ pub fn kill() {
 /// There is no such signal, so this thread sleeps.
 pub fn freeze() {
     std::thread::sleep(Duration::from_secs(u64::MAX));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The system of the tests may have no jobs, so their limits are given here.
+    #[test]
+    fn limits_of_a_job_count_if_they_are_in_force() {
+        let mut limits = JOBOBJECT_EXTENDED_LIMIT_INFORMATION {
+            ProcessMemoryLimit: 1000,
+            JobMemoryLimit: 500,
+            ..JOBOBJECT_EXTENDED_LIMIT_INFORMATION::default()
+        };
+        assert_eq!(allowed(&limits, 2000), 2000);
+        limits.BasicLimitInformation.LimitFlags = JOB_OBJECT_LIMIT_PROCESS_MEMORY;
+        assert_eq!(allowed(&limits, 2000), 1000);
+        limits.BasicLimitInformation.LimitFlags |= JOB_OBJECT_LIMIT_JOB_MEMORY;
+        assert_eq!(allowed(&limits, 2000), 500);
+        assert_eq!(allowed(&limits, 100), 100);
+        assert!(memory_allowed() > 0 && memory_allowed() <= physical());
+    }
 }

@@ -3,9 +3,11 @@
 //! It is in files of JSON, each with a map from keys `depth-x-y-z` to numbers of points. The number -1 says that the
 //! nodes from there on are in a file of their own.
 
+use super::super::crop::Nearby;
 use super::super::input::Input;
-use super::super::spool::SourceWriter;
+use super::super::reads::Means;
 use super::info::{Info, damaged};
+use super::pins::Pinned;
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::memory::Reservation;
 use std::collections::{BTreeMap, BTreeSet};
@@ -70,6 +72,8 @@ pub(super) struct Node {
 /// The nodes to read, sorted by key.
 pub(super) struct Nodes {
     pub(super) all: Vec<Node>,
+    /// The files that were read, if they are on a server.
+    pub(super) files: Vec<Pinned>,
     _memory: Reservation,
 }
 
@@ -77,15 +81,21 @@ pub(super) struct Nodes {
 ///
 /// # Errors
 /// [`outcrop_disk::error::Error::Input`] where it is damaged; errors of memory and files.
-pub(super) fn read(input: &Input, info: &Info, target: &SourceWriter<'_>) -> Result<Nodes> {
-    let workspace = target.workspace;
-    let mut memory = workspace.reserve("EPT hierarchy", 0)?;
+pub(super) fn read(
+    input: &Input,
+    info: &Info,
+    region: Option<&Nearby<'_>>,
+    means: Means<'_>,
+) -> Result<Nodes> {
+    let mut memory = means.reserve("EPT hierarchy", 0)?;
     let (mut all, mut seen, mut pages) = (Vec::new(), BTreeSet::new(), vec![Key::ROOT]);
+    let mut files = Vec::new();
     while let Some(page) = pages.pop() {
-        workspace.check_cancel()?;
+        means.cancel.check()?;
         let name = format!("ept-hierarchy/{}.json", page.name());
-        let text = input.beside(&name, LONGEST)?;
-        let held = workspace.reserve("EPT hierarchy file", 8 * text.len() as u64)?;
+        let (text, version) = input.beside(&name, LONGEST)?;
+        files.extend(version.map(|version| (name.clone(), version)));
+        let held = means.reserve("EPT hierarchy file", 8 * text.len() as u64)?;
         let map: BTreeMap<String, i64> = serde_json::from_slice(&text).map_err(|e| {
             damaged(
                 input,
@@ -101,9 +111,7 @@ pub(super) fn read(input: &Input, info: &Info, target: &SourceWriter<'_>) -> Res
         for (text, points) in map {
             let key = Key::parse(&text)
                 .ok_or_else(|| damaged(input, &name, format!("the key {text:?}"), "depth-x-y-z"))?;
-            let wanted = target
-                .region()
-                .is_none_or(|r| r.may_meet(key.cube(info.cube)));
+            let wanted = region.is_none_or(|r| r.may_meet(key.cube(info.cube)));
             match points {
                 0 => {}
                 1..=MOST_POINTS if wanted => all.push(Node {
@@ -134,6 +142,7 @@ pub(super) fn read(input: &Input, info: &Info, target: &SourceWriter<'_>) -> Res
     }
     Ok(Nodes {
         all,
+        files,
         _memory: memory,
     })
 }

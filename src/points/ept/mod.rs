@@ -3,6 +3,7 @@
 
 mod hierarchy;
 mod info;
+mod pins;
 mod rows;
 mod tiles;
 
@@ -12,9 +13,10 @@ use super::crs::{Crs, CrsSource};
 use super::format::Format;
 use super::input::Input;
 use super::point_format::{Claims, Head, PointFile, PointFormat, Refusal};
+use super::reads::{Means, Reads};
 use super::spool::SourceWriter;
 use super::wkt::well_known;
-use info::Info;
+use info::{Data, Info};
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::Workspace;
 use tiles::Kind;
@@ -94,14 +96,45 @@ impl PointFile for Tiles {
         outside.then(|| self.kind.in_native(self.info.conforming))
     }
 
+    fn reads(&self, input: &Input, nearby: Option<&Nearby<'_>>, means: Means<'_>) -> Result<Reads> {
+        let (bytes, points) = self.kind.sample(input, &self.info)?;
+        let bytes_of = |wanted: u64| {
+            let bytes = u128::from(wanted) * u128::from(bytes) / u128::from(points.max(1));
+            u64::try_from(bytes).unwrap_or(u64::MAX)
+        };
+        let all = self.info.points;
+        let mut reads = Reads {
+            bytes: bytes_of(all),
+            bytes_of_all: bytes_of(all),
+            points: all,
+            parts: None,
+            is_estimated: self.info.data != Data::Binary,
+        };
+        if nearby.is_some() {
+            let nodes = hierarchy::read(input, &self.info, nearby, means)?.all;
+            reads.points = nodes.iter().map(|node| node.points).sum();
+            reads.bytes = bytes_of(reads.points);
+            reads.parts = Some(nodes.len() as u64);
+        }
+        Ok(reads)
+    }
+
     fn read(&self, input: &Input, target: &SourceWriter<'_>) -> Result<Vec<String>> {
-        let nodes = hierarchy::read(input, &self.info, target)?;
+        let mut nodes = hierarchy::read(
+            input,
+            &self.info,
+            target.region(),
+            Means::of(target.workspace),
+        )?;
         let found: u64 = nodes.all.iter().map(|node| node.points).sum();
         let left_out = self.info.points.saturating_sub(found);
         if left_out > 0 && target.region().is_some() {
             target.skip(left_out, self.kind.in_native(self.info.conforming));
         }
-        self.kind.read(input, &self.info, &nodes.all, target)?;
+        nodes.files.extend(self.kind.root().cloned());
+        let begun = pins::check(input, &mut nodes.files, target)?;
+        self.kind
+            .read(input, &self.info, (&nodes.all, begun), target)?;
         let mut warnings = Vec::new();
         if target.region().is_none() && found != self.info.points {
             let claimed = self.info.points;

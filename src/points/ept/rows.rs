@@ -84,6 +84,15 @@ impl Rows {
         target.units("EPT nodes", nodes.len(), memory, work)
     }
 
+    /// The number of rows of a compressed file.
+    pub(super) fn count(&self, input: &Input, name: &str, file: &[u8]) -> Result<u64> {
+        let bytes = zstd::stream::read::Decoder::with_buffer(file)
+            .and_then(|mut decoder| std::io::copy(&mut decoder, &mut std::io::sink()));
+        let bytes = bytes
+            .map_err(|e| damaged(input, name, e.to_string(), "rows compressed by Zstandard"))?;
+        Ok(bytes / self.bytes as u64)
+    }
+
     /// The rows of a file, at most those of so many points and one byte more.
     fn unpacked<'a>(
         &self,

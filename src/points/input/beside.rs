@@ -1,6 +1,6 @@
 //! Small files in the folder of an input, on this machine or on a server.
 
-use super::super::remote::{Beside, Expected};
+use super::super::remote::{Beside, Expected, Version};
 use super::{Input, Source};
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::{IoCounters, Workspace};
@@ -22,26 +22,42 @@ impl Input {
         }
     }
 
-    /// The bytes of the file `name` in its folder; at most `most`.
-    pub(in super::super) fn beside(&self, name: &str, most: u64) -> Result<Vec<u8>> {
+    /// The bytes of the file `name` in its folder, at most `most`; and its version, if it is on a server.
+    pub(in super::super) fn beside(
+        &self,
+        name: &str,
+        most: u64,
+    ) -> Result<(Vec<u8>, Option<Version>)> {
         let path = self.path.with_file_name(name);
         let read = match self.folder()? {
-            Some(folder) => folder.read(name, most),
-            None => read(&path, most),
+            Some(folder) => folder
+                .read(name, most)
+                .map(|(bytes, version)| (bytes, Some(version))),
+            None => read(&path, most).map(|bytes| (bytes, None)),
         };
-        let bytes = read.map_err(|e| Error::io(&path, "read", e))?;
+        let (bytes, version) = read.map_err(|e| Error::io(&path, "read", e))?;
         self.io.add_read(bytes.len() as u64);
-        Ok(bytes)
+        Ok((bytes, version))
     }
 
-    /// Files in its folder that will be read in this order, each with its largest size.
+    /// The latest time that its server told, in seconds since 1970.
+    pub(in super::super) fn clock(&self) -> Option<i64> {
+        match &self.source {
+            Source::Remote(remote) => remote.clock(),
+            _ => None,
+        }
+    }
+
+    /// Files in its folder that will be read in this order, each with its largest size. One on a server that has changed
+    /// after `begun`, in seconds since 1970, is an error.
     pub(in super::super) fn expect_beside(
         &self,
         files: Vec<(String, u64)>,
+        begun: Option<i64>,
         workspace: &Workspace,
     ) -> Result<Files> {
         let folder = self.folder()?;
-        let expected = folder.map(|folder| folder.expect(files.clone(), workspace));
+        let expected = folder.map(|folder| folder.expect(files.clone(), begun, workspace));
         Ok(Files {
             path: self.path.clone(),
             files,

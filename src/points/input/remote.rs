@@ -26,6 +26,7 @@ impl Input {
         wanted: Wanted<'_>,
         workspace: &Workspace,
     ) -> Result<Self> {
+        Remote::count(workspace)?;
         let remote = Remote::open(path)?;
         let mut magic = [0; MAGIC];
         let got = remote.read_at(&mut magic, 0);
@@ -67,8 +68,8 @@ impl Input {
         let Some(beginning) = Beginning::within(path, &kept, all, most)? else {
             return Err(input.error(
                 "compression",
-                "a ZIP archive on a server",
-                "the cloud itself, or a local archive",
+                "a ZIP archive on a server, whose list is at its end",
+                "the cloud itself, a local archive, or a command that reads all points",
             ));
         };
         input.bytes = beginning.likely;

@@ -32,6 +32,7 @@ use super::format::Format;
 use super::input::Input;
 use super::native::Native;
 use super::point_format::{Claims, Head, PointFile, PointFormat, Refusal};
+use super::reads::{Means, Reads};
 use super::spool::{Sink, SourceWriter};
 use fields::Fields;
 use outcrop_disk::error::Result;
@@ -110,6 +111,13 @@ impl PointFile for Header {
         // What is damaged is reported when the file is read.
         let outside = Header::lies_outside(self, input, wanted, workspace).unwrap_or(false);
         self.native_bounds().filter(|_| outside)
+    }
+
+    fn reads(&self, input: &Input, nearby: Option<&Nearby<'_>>, means: Means<'_>) -> Result<Reads> {
+        match nearby {
+            Some(nearby) => self.reads_near(input, nearby, means),
+            None => Ok(Reads::whole(input, self.claimed)),
+        }
     }
 
     fn crs(&self, input: &Input) -> Option<Crs> {

@@ -5,6 +5,7 @@
 
 use super::super::crop::Nearby;
 use super::super::input::Input;
+use super::super::reads::{Means, Reads};
 use super::super::spool::SourceWriter;
 use super::copc::Hierarchy;
 use super::table::{self, Chunk};
@@ -100,6 +101,32 @@ impl Header {
         self.agrees(input, &places)
     }
 
+    /// What is read of the file if these points are wanted. Header and hierarchy are believed.
+    pub(super) fn reads_near(
+        &self,
+        input: &Input,
+        wanted: &Nearby<'_>,
+        means: Means<'_>,
+    ) -> Result<Reads> {
+        let whole = Reads::whole(input, self.claimed);
+        let outside = |bounds: [[f64; 3]; 2]| !wanted.may_meet(bounds);
+        if self.claimed > 0 && self.bounds().is_some_and(outside) {
+            return Ok(Reads {
+                bytes: 0,
+                points: 0,
+                ..whole
+            });
+        }
+        if !self.format.is_compressed || !input.is_at_hand() {
+            return Ok(whole);
+        }
+        Ok(match Hierarchy::read(input, self, means)? {
+            Some(Ok(hierarchy)) => hierarchy.reads(input, self.slack(), wanted),
+            // All chunks of a file with a damaged one are read.
+            Some(Err(_)) | None => whole,
+        })
+    }
+
     /// The box of the header in the file's integers; the lowest ends first.
     pub(super) fn native_bounds(&self) -> Option<[[f64; 3]; 2]> {
         let [low, high] = self.bounds()?;
@@ -125,7 +152,7 @@ pub(super) fn outside(
         return Ok(None);
     };
     let warning = |why: &str| Ok(Some(format!("{why}: all of its chunks are read")));
-    let hierarchy = match Hierarchy::read(input, header, writer.workspace)? {
+    let hierarchy = match Hierarchy::read(input, header, Means::of(writer.workspace))? {
         None => return Ok(None),
         Some(Err(why)) => return warning(&format!("the COPC hierarchy is damaged ({why})")),
         Some(Ok(hierarchy)) => hierarchy,

@@ -32,6 +32,11 @@ impl Laz {
         fields::columns(&self.0)
     }
 
+    /// Points of that node, as its header claims them.
+    pub(in super::super) fn points(&self) -> u64 {
+        self.0.claimed
+    }
+
     /// Reads all points of a node; returns their number.
     pub(in super::super) fn read_all(
         &self,

@@ -16,6 +16,10 @@ impl Remote {
         Err(refused(path))
     }
 
+    pub(in super::super) fn count(_: &Workspace) -> Result<()> {
+        Ok(())
+    }
+
     pub(in super::super) fn version(&self) -> Version {
         match *self {}
     }
@@ -44,6 +48,10 @@ impl Remote {
         match *self {}
     }
 
+    pub(in super::super) fn clock(&self) -> Option<i64> {
+        match *self {}
+    }
+
     pub(in super::super) fn beside(&self, _: &Path) -> Result<Beside> {
         match *self {}
     }
@@ -53,13 +61,14 @@ impl Remote {
 pub(in super::super) enum Beside {}
 
 impl Beside {
-    pub(in super::super) fn read(&self, _: &str, _: u64) -> std::io::Result<Vec<u8>> {
+    pub(in super::super) fn read(&self, _: &str, _: u64) -> std::io::Result<(Vec<u8>, Version)> {
         match *self {}
     }
 
     pub(in super::super) fn expect(
         &self,
         _: Vec<(String, u64)>,
+        _: Option<i64>,
         _: &Workspace,
     ) -> Result<Expected> {
         match *self {}

@@ -16,7 +16,7 @@ use crate::order::{Grouped, MOST_GROUPS, StoredPoints, cuts};
 use buckets::Buckets;
 pub use displacement::displacement;
 use outcrop_disk::error::Result;
-use outcrop_disk::spill::{Row, Shuffle, Table, release};
+use outcrop_disk::spill::{Row, Shuffle, Table, release, sort};
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_geom::lattice::Lattice;
@@ -367,7 +367,7 @@ impl Job<'_> {
             self.spool
                 .for_values(self.workspace, self.lattice, frames, self.carried, take)?;
             let _held = unit.hold(bytes_of(&rows) + VALUE_BUFFERS);
-            rows.sort_unstable_by(R::compare);
+            sort(&mut rows);
             rows.dedup_by(|b, a| rows::key(a) == rows::key(b));
             rows::send_to(&mut rows, cuts);
             unit.advance(source.points(group));

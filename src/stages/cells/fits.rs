@@ -194,7 +194,7 @@ pub fn each_neighborhood<T>(
 }
 
 /// Calls `each` with every point of a tile whose id is `wanted`, and its `count` nearest neighbours, or all
-/// points if there are fewer, in order of id.
+/// points if there are fewer, in order of id. `each` may swap them for others.
 ///
 /// # Errors
 /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
@@ -204,16 +204,14 @@ pub(crate) fn each_around(
     ids: Range<usize>,
     count: usize,
     wanted: impl Fn(usize) -> bool,
-    each: impl FnMut(usize, Point, &Around),
+    each: impl FnMut(usize, Point, &mut Around),
 ) -> Result<()> {
     let planes = Planes::load(unit, store, ids, &wanted, count)?;
     let each = RefCell::new(each);
     let in_tile = |(search, grown): Watched<'_, '_>, found: &mut Found<'_, ()>| {
-        let look = |id: Id, point: Point, around: Option<&Around>| {
-            if let Some(around) = around {
-                (each.borrow_mut())(id.index(), point, around);
-            }
-            found(id, point, Ok(around.map(|_| &())));
+        let look = |id: Id, point: Point, around: Option<&mut Around>| {
+            let known = around.map(|around| (each.borrow_mut())(id.index(), point, around));
+            found(id, point, Ok(known.as_ref()));
         };
         planes
             .tile
@@ -223,7 +221,7 @@ pub(crate) fn each_around(
     let in_store = |cache: &mut PageCache, id: Id, point: Point| {
         let near = near_in_store(store, cache, id, point, count)?;
         around.set(&near, count, id);
-        (each.borrow_mut())(id.index(), point, &around);
+        (each.borrow_mut())(id.index(), point, &mut around);
         Ok(Some(()))
     };
     look(unit, in_tile, in_store, |_, _, _| ())

@@ -130,39 +130,58 @@ fn solved<F: Numbers, const N: usize>(m: &[[F; TERMS + 1]; TERMS]) -> [F; TERMS]
 }
 
 impl Fit<[f64; LANES]> {
-    /// The surfaces of the point in `lane`.
-    pub fn lane(&self, lane: usize) -> Fit<f64> {
+    /// The terms of the surface of second order of the point in `lane`.
+    pub fn curved(&self, lane: usize) -> [f64; TERMS] {
+        self.curved.map(|term| term[lane])
+    }
+
+    /// Weighted mean of the squared heights over that surface.
+    pub fn mean2(&self, lane: usize) -> f64 {
+        (self.over_curved[lane] / self.total[lane]).max(0.0)
+    }
+
+    /// The surfaces of all points.
+    #[inline(always)]
+    pub fn loaded<F: Eight>(&self) -> Fit<F> {
         Fit {
-            plane: self.plane.map(|term| term[lane]),
-            curved: self.curved.map(|term| term[lane]),
-            over_plane: self.over_plane[lane],
-            over_curved: self.over_curved[lane],
-            total: self.total[lane],
-            squares: self.squares[lane],
+            plane: loaded(&self.plane),
+            curved: loaded(&self.curved),
+            over_plane: F::load(&self.over_plane),
+            over_curved: F::load(&self.over_curved),
+            total: F::load(&self.total),
+            squares: F::load(&self.squares),
         }
     }
 }
 
-impl Fit<f64> {
+impl<F: Numbers> Fit<F> {
     /// Weighted mean of the squared heights over the surface of second order.
-    pub fn mean2(&self) -> f64 {
-        (self.over_curved / self.total).max(0.0)
+    #[inline(always)]
+    pub fn mean2_body(&self) -> F {
+        (self.over_curved / self.total).larger(F::splat(0.0))
     }
 
     /// The share of the surface of second order: 0 if a plane is enough, 1 if it is not.
-    pub fn share(&self) -> f64 {
+    #[inline(always)]
+    pub fn share_body(&self) -> F {
         // As many points of equal weight would tell as much.
         let points = self.total * self.total / self.squares;
         let more = self.over_plane - self.over_curved;
-        let freedom = points - TERMS as f64;
-        let worth = more * freedom / (self.over_curved * (TERMS - PLANE) as f64);
+        let freedom = points - F::splat(TERMS as f64);
+        let worth = more * freedom / (self.over_curved * F::splat((TERMS - PLANE) as f64));
         let [enough, needed] = [METHOD.smoothing.enough, METHOD.smoothing.needed];
-        if worth > enough {
-            ((worth - enough) / (needed - enough)).min(1.0)
-        } else {
-            0.0
-        }
+        let part = (worth - F::splat(enough)) / F::splat(needed - enough);
+        share_if(worth.greater(F::splat(enough)), part)
     }
+}
+
+/// A share of at most 1 where bits are set, else 0.
+#[inline(always)]
+pub(super) fn share_if<F: Numbers>(bits: u64, share: F) -> F {
+    let (none, one) = (F::splat(0.0), F::splat(1.0));
+    let [share] = F::choose(one.greater(share), [share], [one]);
+    let [share] = F::choose(bits, [share], [none]);
+    share
 }
 
 #[cfg(test)]
@@ -208,6 +227,17 @@ mod tests {
         sums
     }
 
+    fn lane(fit: &Fit<[f64; LANES]>, lane: usize) -> Fit<f64> {
+        Fit {
+            plane: fit.plane.map(|term| term[lane]),
+            curved: fit.curved.map(|term| term[lane]),
+            over_plane: fit.over_plane[lane],
+            over_curved: fit.over_curved[lane],
+            total: fit.total[lane],
+            squares: fit.squares[lane],
+        }
+    }
+
     fn bits(fit: &Fit<f64>) -> Vec<u64> {
         let numbers = [fit.over_plane, fit.over_curved, fit.total, fit.squares];
         let all = fit.plane.iter().chain(&fit.curved).chain(&numbers);
@@ -230,8 +260,8 @@ mod tests {
             let together = std::array::from_fn(|sum| lanes.map(|lane| lane[sum]));
             for level in Level::all() {
                 let found = fits(level, &together);
-                for (lane, sums) in lanes.iter().enumerate() {
-                    prop_assert_eq!(bits(&found.lane(lane)), bits(&Fit::of(sums)));
+                for (place, sums) in lanes.iter().enumerate() {
+                    prop_assert_eq!(bits(&lane(&found, place)), bits(&Fit::of(sums)));
                 }
             }
         }

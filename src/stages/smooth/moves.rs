@@ -18,17 +18,42 @@ pub(super) struct Moves {
     largest2: u64,
 }
 
-impl Moves {
+/// Points that moved, while they are counted: a place for each class up to the highest one.
+#[derive(Debug, Default)]
+pub(super) struct Counts {
+    moved: u64,
+    ended: Vec<u64>,
+    largest2: u64,
+}
+
+impl Counts {
     /// Notes a point that moved. If it moves for the `last` time, its way is that between two positions.
     pub fn note(&mut self, last: bool, from: Point, to: Point) {
         self.moved += 1;
         if last {
             let length2 = distance2(from, to);
             self.largest2 = self.largest2.max(length2);
-            *self.ended.entry(class(length2)).or_default() += 1;
+            // At most 3 776, since a squared length has at most 63 bits.
+            let class = class(length2) as usize;
+            if class >= self.ended.len() {
+                self.ended.resize(class + 1, 0);
+            }
+            self.ended[class] += 1;
         }
     }
 
+    /// All that were noted.
+    pub fn moves(&self) -> Moves {
+        let counts = (0..).zip(self.ended.iter().copied());
+        Moves {
+            moved: self.moved,
+            ended: counts.filter(|(_, count)| *count > 0).collect(),
+            largest2: self.largest2,
+        }
+    }
+}
+
+impl Moves {
     /// Adds the points of another part.
     pub fn add(&mut self, other: &Self) {
         self.moved += other.moved;
@@ -100,11 +125,12 @@ mod tests {
 
     #[test]
     fn lengths_are_those_of_the_last_moves() {
-        let mut moves = Moves::default();
-        moves.note(false, [0; 3], [0, 0, 90]);
+        let mut counts = Counts::default();
+        counts.note(false, [0; 3], [0, 0, 90]);
         for length in 1..=100 {
-            moves.note(true, [0; 3], [0, length, 0]);
+            counts.note(true, [0; 3], [0, length, 0]);
         }
+        let moves = counts.moves();
         let stats = moves.stats(2, 0.5);
         assert!((stats.median - 25.0).abs() < 0.5 && (stats.most - 49.5).abs() < 0.5);
         assert_eq!((stats.largest, stats.rounds), (50.0, 2));

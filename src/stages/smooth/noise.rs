@@ -2,7 +2,7 @@
 //! noise at each point of those regions whose samples show noise.
 
 use super::Relaxing;
-use super::level::Gauge;
+use super::level::Gauges;
 use crate::cells::{Planes, Widen};
 use crate::ids::Id;
 use crate::levels::Levels;
@@ -39,7 +39,7 @@ struct Seen {
 }
 
 /// A sample of a region.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Sample {
     id: Id,
     /// Squared distance of the last neighbour.
@@ -94,28 +94,7 @@ fn look_at(
     relaxing: Relaxing,
 ) -> Result<Seen> {
     let planes = Planes::load(unit, store, ids.clone(), |_| true, relaxing.neighbors)?;
-    let mut gauge = Gauge::default();
-    let mut samples: Vec<Sample> = Vec::with_capacity(ids.len() / METHOD.curve.sample + 16);
-    let measured = relaxing.rounds > 0;
-    planes.each_fit(
-        Widen::OnBands,
-        METHOD.noise.nearest,
-        is_sampled,
-        |id, fit, near| {
-            let (level, plain) = match measured {
-                true => gauge.level(near, fit, relaxing.neighbors),
-                false => (0, false),
-            };
-            Sample {
-                id,
-                last2: fit.near2,
-                level,
-                plain,
-            }
-        },
-        |_, _, sample: &Sample| samples.push(*sample),
-    )?;
-    samples.sort_unstable_by_key(|sample| sample.id);
+    let samples = samples(&planes, ids.len(), relaxing)?;
     let held = unit.hold(bytes_of(&samples));
     let usual2 = usual_reach(&samples);
     let region2 = lower_quartile(usual2.clone());
@@ -134,19 +113,56 @@ fn look_at(
     drop((samples, held));
     let _held = unit.hold(levels.bytes());
     if noisy {
+        let mut gauges = Gauges::default();
+        let mut put = |id: usize, level: u8, _| put(&mut levels, id, level);
         planes.each_fit(
             Widen::OnBands,
             METHOD.noise.nearest,
             |id| is_measured(id) && !is_sampled(id),
-            |_, fit, near| gauge.level(near, fit, relaxing.neighbors).0,
-            |id, _, level| put(&mut levels, id, *level),
+            |id, fit, near| gauges.add(id.index(), near, (fit, relaxing.neighbors), &mut put),
+            |_, _, ()| (),
         )?;
+        gauges.finish(&mut put);
     }
     Ok(Seen {
         usual2,
         region2,
         levels,
     })
+}
+
+/// The samples of a region with a number of `points`, in order of id.
+fn samples(planes: &Planes<'_>, points: usize, relaxing: Relaxing) -> Result<Vec<Sample>> {
+    let mut samples: Vec<Sample> = Vec::with_capacity(points / METHOD.curve.sample + 16);
+    let mut gauges = Gauges::default();
+    let mut put = |sample: Sample, level: u8, plain: bool| {
+        samples.push(Sample {
+            level,
+            plain,
+            ..sample
+        });
+    };
+    let measured = relaxing.rounds > 0;
+    planes.each_fit(
+        Widen::OnBands,
+        METHOD.noise.nearest,
+        is_sampled,
+        |id, fit, near| {
+            let sample = Sample {
+                id,
+                last2: fit.near2,
+                ..Sample::default()
+            };
+            match measured {
+                true => gauges.add(sample, near, (fit, relaxing.neighbors), &mut put),
+                false => put(sample, 0, false),
+            }
+        },
+        |_, _, ()| (),
+    )?;
+    gauges.finish(&mut put);
+    samples.sort_unstable_by_key(|sample| sample.id);
+    Ok(samples)
 }
 
 fn is_sampled(id: usize) -> bool {

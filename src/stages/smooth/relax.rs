@@ -4,8 +4,8 @@
 //! Restricted Voronoi cells disagree where points lie off the surface by a part of their spacing (scale space;
 //! Digne et al., *Scale space meshing of raw data point sets*, Computer Graphics Forum 30, 2011).
 
-use super::foot::{Feet, Foot};
-use super::moves::Moves;
+use super::foot::{Feet, Foot, Settle};
+use super::moves::{Counts, Moves};
 use super::noise::{Found, look};
 use super::pass::Pass;
 use super::{Relaxing, moved};
@@ -15,7 +15,6 @@ use crate::order::{PointStore, StoredPoints};
 use crate::spacing::{StoredSpacings, spacing2};
 use crate::tiles::near::Around;
 use outcrop_disk::error::Result;
-use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_geom::Point;
 use outcrop_geom::method::METHOD;
@@ -53,13 +52,14 @@ pub struct RelaxStats {
 /// The number of rounds in which a point with these neighbours moves, itself included: the highest level that
 /// more than nine tenths of them reach.
 fn rounds(levels: &Levels, around: &Around) -> u8 {
-    let mut counts = [0; 4];
+    // 16 bits for each level: no addition waits for one in memory.
+    let mut counts = 0u64;
     for id in around.ids() {
-        counts[levels.get(*id as usize) as usize] += 1;
+        counts += 1 << (16 * levels.get(*id as usize));
     }
     let (mut below, mut rounds) = (0, 0);
-    for (level, count) in (1..).zip(&counts[..3]) {
-        below += count;
+    for level in 1..=HIGHEST {
+        below += (counts >> (16 * (level - 1)) & 0xffff) as usize;
         if METHOD.noise.few * below >= around.count() {
             break;
         }
@@ -90,7 +90,7 @@ impl Noisy {
     }
 
     /// The position to which it moves. An outlier, which is too far from the surface, stays.
-    fn moved(&self, Foot { offset, .. }: Foot) -> Point {
+    fn moved(&self, Foot { offset }: Foot) -> Point {
         let limit = METHOD.smoothing.farthest;
         let length2 = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2];
         if length2 > limit * limit * self.reach2 as f64 {
@@ -102,9 +102,52 @@ impl Noisy {
 
     /// True if `count` neighbours are farther from their surface than noise explains: there are layers, such
     /// as the two sides of a thin plate, or details.
-    fn has_layers(&self, foot: Foot, count: usize) -> bool {
+    fn has_layers(&self, mean2: f64, count: usize) -> bool {
         let limit = METHOD.noise.layers * f64::from(self.rounds);
-        foot.mean2 > limit * limit * spacing2(self.reach2, count)
+        mean2 > limit * limit * spacing2(self.reach2, count)
+    }
+}
+
+/// Moves noisy points to their feet, those whose neighbours lie in layers by fewer neighbours.
+struct Mover<P> {
+    /// The numbers of neighbours, and of those in layers.
+    count: usize,
+    fewer: usize,
+    layered: Feet<Noisy>,
+    keys: Vec<(u64, usize)>,
+    /// Receives the noisy points and the positions to which they move.
+    put: P,
+}
+
+impl<P: FnMut(Noisy, Point)> Mover<P> {
+    /// Moves the points in layers that are left.
+    fn finish(&mut self) {
+        let put = &mut self.put;
+        self.layered
+            .finish(&mut |noisy: Noisy, foot: Foot| put(noisy, noisy.moved(foot)));
+    }
+}
+
+impl<P: FnMut(Noisy, Point)> Settle<Noisy> for Mover<P> {
+    fn is_layered(&self, noisy: &Noisy, mean2: f64) -> bool {
+        self.fewer < self.count && noisy.has_layers(mean2, self.count)
+    }
+
+    fn settle_layered(&mut self, noisy: Noisy, around: &mut Around) {
+        around.keep_nearest(self.fewer, &mut self.keys);
+        let reach2 = around.last2();
+        let put = &mut self.put;
+        self.layered.add(
+            Noisy { reach2, ..noisy },
+            around,
+            &mut |noisy: Noisy, foot: Foot| {
+                put(noisy, noisy.moved(foot));
+            },
+        );
+    }
+
+    fn settle(&mut self, noisy: Noisy, foot: Foot) {
+        (self.put)(noisy, noisy.moved(foot));
     }
 }
 
@@ -156,37 +199,36 @@ impl Round<'_> {
             return Ok(done);
         }
         let original = self.original.slice(ids.clone())?;
-        let Done { rounds, moves, .. } = &mut done;
-        let mut put = |noisy: Noisy, to: Point| {
+        let mut counts = Counts::default();
+        let put = |noisy: Noisy, to: Point| {
             points[noisy.id - ids.start] = to;
             let last = u32::from(noisy.rounds) == self.number;
-            moves.note(last, original[noisy.id - ids.start], to);
+            counts.note(last, original[noisy.id - ids.start], to);
         };
-        let layered = self.move_most(unit, store, ids.clone(), rounds, &mut put)?;
-        let _held = unit.hold(bytes_of(&layered));
-        self.move_layered(unit, store, ids.clone(), &layered, put)?;
+        self.move_noisy(unit, store, ids.clone(), &mut done.rounds, put)?;
+        done.moves = counts.moves();
         Ok(done)
     }
 
     /// Calls `put` with the noisy points and the positions to which they move; sets the `rounds` in which
-    /// points move, if this is the first. Returns the ids of those whose neighbours lie in layers, ascending,
-    /// with their rounds.
-    fn move_most(
+    /// points move, if this is the first.
+    fn move_noisy(
         &self,
         unit: &Unit<'_>,
         store: &PointStore,
         ids: Range<usize>,
         to: &mut Levels,
-        put: &mut impl FnMut(Noisy, Point),
-    ) -> Result<Vec<(usize, u8)>> {
+        put: impl FnMut(Noisy, Point),
+    ) -> Result<()> {
         let most = self.relaxing.rounds.min(u32::from(HIGHEST)) as u8;
         let count = self.relaxing.neighbors * METHOD.smoothing.neighbors;
-        let mut layered = Vec::new();
         let mut feet = Feet::default();
-        let fewer = self.fewer() < count;
-        let mut settle = |noisy: Noisy, foot: Foot| match fewer && noisy.has_layers(foot, count) {
-            true => layered.push((noisy.id, noisy.rounds)),
-            false => put(noisy, noisy.moved(foot)),
+        let mut mover = Mover {
+            count,
+            fewer: self.fewer(),
+            layered: Feet::default(),
+            keys: Vec::new(),
+            put,
         };
         let wanted = |id: usize| self.is_first() || u32::from(self.levels.get(id)) >= self.number;
         let first = ids.start;
@@ -199,38 +241,11 @@ impl Round<'_> {
                 self.levels.get(id)
             };
             if rounds > 0 {
-                feet.add(Noisy::new((id, point), rounds, around), around, &mut settle);
+                feet.add(Noisy::new((id, point), rounds, around), around, &mut mover);
             }
         })?;
-        feet.finish(&mut settle);
-        layered.sort_unstable();
-        Ok(layered)
-    }
-
-    /// As [`Round::move_most`], for the points whose neighbours lie in layers: they move by fewer neighbours.
-    fn move_layered(
-        &self,
-        unit: &Unit<'_>,
-        store: &PointStore,
-        ids: Range<usize>,
-        layered: &[(usize, u8)],
-        mut put: impl FnMut(Noisy, Point),
-    ) -> Result<()> {
-        if layered.is_empty() {
-            return Ok(());
-        }
-        let place = |id: usize| layered.binary_search_by_key(&id, |(id, _)| *id);
-        let count = self.fewer();
-        let mut feet = Feet::default();
-        let mut settle = |noisy: Noisy, foot: Foot| put(noisy, noisy.moved(foot));
-        let wanted = |id: usize| place(id).is_ok();
-        each_around(unit, store, ids, count, wanted, |id, point, around| {
-            if let Ok(place) = place(id) {
-                let noisy = Noisy::new((id, point), layered[place].1, around);
-                feet.add(noisy, around, &mut settle);
-            }
-        })?;
-        feet.finish(&mut settle);
+        feet.finish(&mut mover);
+        mover.finish();
         Ok(())
     }
 }

@@ -15,6 +15,7 @@ use outcrop_geom::{Point, distance2};
 use std::ops::Range;
 
 mod around;
+mod divided;
 mod groups;
 mod list;
 mod query;
@@ -22,6 +23,7 @@ mod sums;
 
 pub use super::neighbors::Sums;
 pub use around::Around;
+use divided::list_divided;
 pub use groups::{Group, Neighborhood};
 use list::list_nearest;
 pub use query::Query;
@@ -74,22 +76,44 @@ impl Tile {
         grown: impl FnMut(u64),
         each: impl FnMut(Id, Point, Option<Query<'_>>),
     ) {
-        self.for_some_queries(k, search, |_| true, grown, each);
+        self.for_queries(k, search, |_| true, grown, each, |_, _, _| None);
     }
 
-    /// As [`Tile::for_each_query`], for the points whose ids are `wanted`.
+    /// As [`Tile::for_each_query`], for the points whose ids are `wanted`; most queries list the `k` nearest and
+    /// no others.
     pub fn for_some_queries(
         &self,
         k: usize,
         search: &mut Search,
         wanted: impl Fn(usize) -> bool,
         grown: impl FnMut(u64),
+        each: impl FnMut(Id, Point, Option<Query<'_>>),
+    ) {
+        let first = |search: &mut Search, point: Point, id: Id| {
+            list_divided(search.level, search, point, id.get(), k)
+        };
+        self.for_queries(k, search, wanted, grown, each, first);
+    }
+
+    /// As [`Tile::for_some_queries`]. `first` may list the neighbours, and returns the squared distance up to which
+    /// the list is complete; where it does not, they are listed as for [`Tile::for_each_query`].
+    fn for_queries(
+        &self,
+        k: usize,
+        search: &mut Search,
+        wanted: impl Fn(usize) -> bool,
+        grown: impl FnMut(u64),
         mut each: impl FnMut(Id, Point, Option<Query<'_>>),
+        first: impl Fn(&mut Search, Point, Id) -> Option<u64>,
     ) {
         self.for_groups(k, search, wanted, grown, |own, index, id, search| {
-            let query = self.query(own, index, id, k, search);
+            let point = self.points.get(index);
+            let query = match first(search, point, id) {
+                Some(complete2) => Some(self.listed(own, index, id, search, complete2)),
+                None => self.query(own, index, id, k, search),
+            };
             let farthest = query.as_ref().map_or(0, |query| query.farthest2(k));
-            each(id, self.points.get(index), query);
+            each(id, point, query);
             farthest
         });
     }
@@ -104,14 +128,26 @@ impl Tile {
         search: &'a mut Search,
     ) -> Option<Query<'a>> {
         let complete2 = self.nearest(own, index, id, k, search)?;
-        Some(Query {
+        Some(self.listed(own, index, id, search, complete2))
+    }
+
+    /// A query whose neighbours are listed.
+    fn listed<'a>(
+        &'a self,
+        own: &'a OwnPage,
+        index: usize,
+        id: Id,
+        search: &'a mut Search,
+        complete2: u64,
+    ) -> Query<'a> {
+        Query {
             tile: self,
             own,
             search,
             point: self.points.get(index),
             id,
             complete2,
-        })
+        }
     }
 
     /// Gathers the candidates of each leaf with `wanted` ids, and calls `one` with the page, index and id of

@@ -4,7 +4,7 @@ use outcrop_disk::error::Result;
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_geom::Point;
 use outcrop_geom::aabb::Aabb;
-use outcrop_geom::kernels::BLOCK;
+use outcrop_geom::kernels::{BLOCK, Level, kernel};
 use std::ops::Range;
 
 /// Points in columns that are a block longer than the number of points, so that a whole block can be read
@@ -62,14 +62,10 @@ impl Points {
 
     /// The bounding box of the points in `range`.
     pub fn bounds(&self, range: Range<usize>) -> Aabb {
-        let mut bounds = Aabb::EMPTY;
-        for (axis, column) in self.columns().into_iter().enumerate() {
-            let column = &column[range.clone()];
-            let (min, max) = (&mut bounds.min[axis], &mut bounds.max[axis]);
-            *min = column.iter().fold(*min, |a, b| a.min(*b));
-            *max = column.iter().fold(*max, |a, b| a.max(*b));
-        }
-        bounds
+        let [x, y, z] = self.columns();
+        let columns = [&x[range.clone()], &y[range.clone()], &z[range]];
+        let (min, max) = bounds(Level::best(), columns);
+        Aabb { min, max }
     }
 
     /// The coordinates of the points in `range`.
@@ -94,4 +90,23 @@ impl Points {
     pub fn bytes(&self) -> u64 {
         bytes_of(&self.words)
     }
+}
+
+kernel! {
+    /// The lowest and highest coordinates of columns; those of [`Aabb::EMPTY`] if there are none.
+    fn bounds(columns: [&[i32]; 3]) -> (Point, Point) = bounds_body
+}
+
+#[inline(always)]
+fn bounds_body(columns: [&[i32]; 3]) -> (Point, Point) {
+    let Aabb { mut min, mut max } = Aabb::EMPTY;
+    for (axis, column) in columns.into_iter().enumerate() {
+        let (mut low, mut high) = (min[axis], max[axis]);
+        for c in column {
+            low = low.min(*c);
+            high = high.max(*c);
+        }
+        (min[axis], max[axis]) = (low, high);
+    }
+    (min, max)
 }

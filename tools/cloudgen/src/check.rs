@@ -197,7 +197,7 @@ fn excluded_outdoors(cloud: &Cloud) -> Option<(&'static str, &'static str, &'sta
     if cloud.kind != Kind::Outdoor {
         let why = "only the kind outdoor has them";
         let plain = cloud.objects == Objects::default();
-        return (!plain).then_some(("trees, wires or wall-height", cloud.kind.name(), why));
+        return (!plain).then_some(("trees, wires, wall-height or epoch", cloud.kind.name(), why));
     }
     let density = "it has a density of its own";
     [

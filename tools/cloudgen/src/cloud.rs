@@ -289,6 +289,12 @@ impl Cloud {
         Ok(discs)
     }
 
+    /// Where the second survey of the outdoor world differs from the first, in the coordinates of the points without
+    /// offset; none for the first.
+    pub fn changes(&self) -> Option<outdoor::Changes> {
+        Land::new(self.seed, &self.objects).changes
+    }
+
     /// Compares a mesh of the outdoor world, a binary PLY file, with the ground. Only seed, objects and
     /// offset of the description are used.
     pub fn measure_mesh(&self, path: impl AsRef<Path>) -> Result<GroundReport> {

@@ -86,6 +86,9 @@ impl Generator {
         if cloud.kind == Kind::Outdoor {
             let land = Land::new(cloud.seed, &cloud.objects);
             let source = Source::Outdoor(Outdoor::new(&land, cloud.points));
+            // Another survey measures other points.
+            let seed = cloud.seed ^ u64::from(cloud.objects.epoch) << 63;
+            let cloud = &cloud.clone().seed(seed);
             return Ok(Self::with(cloud, source, Outdoor::bounds(), [0.0; 3]));
         }
         let Some(surface) = reference::surface(cloud)? else {

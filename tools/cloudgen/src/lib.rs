@@ -43,7 +43,7 @@ pub use error::{Error, Result};
 pub use generator::Generator;
 pub use kind::Kind;
 pub use odd::Odd;
-pub use outdoor::{GroundReport, OUTDOOR_SIDE, Objects};
+pub use outdoor::{Changes, GroundReport, HEAP_VOLUME, OUTDOOR_SIDE, Objects, PIT_VOLUME};
 pub use sampling::{MOST_HELD, Sampling};
 pub use scene::{MOST_IN_SCENE, Measuring, Scene};
 pub use spots::{Spots, median};

@@ -122,6 +122,11 @@ struct Args {
     #[arg(long, value_name = "UNITS")]
     wall_height: Option<f64>,
 
+    /// A second survey of the outdoor world, of other points: a pit of 310 and a heap of 231 cubic units were made, and a
+    /// house of 12 x 9 x 6; ten trees were felled
+    #[arg(long)]
+    epoch: bool,
+
     /// Noise of a scene, in spacings: along the ray at the mean range, growing with the range; in all
     /// directions where there is no scanner
     #[arg(long, value_name = "SPACINGS", default_value_t = 0.0)]
@@ -274,6 +279,7 @@ fn cloud(args: &Args) -> Cloud {
             trees: args.trees.unwrap_or(Objects::default().trees),
             wires: args.wires,
             wall_height: args.wall_height,
+            epoch: args.epoch,
         })
         .measuring(Measuring {
             noise: args.range_noise,

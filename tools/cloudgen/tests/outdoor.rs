@@ -162,6 +162,7 @@ fn settings_that_do_not_fit_are_refused() {
             trees,
             wires,
             wall_height,
+            epoch: false,
         };
         world(100).objects(objects).generator().unwrap_err()
     };

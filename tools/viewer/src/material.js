@@ -1,9 +1,10 @@
 // The materials of tiles. Colours are as on the screen throughout: no conversions by the renderer.
 
 import { Color, DoubleSide, GLSL3, ShaderMaterial, Vector3, Vector4 } from 'three';
+import { SIGNED } from './ramps.js';
 
-/** Ways to colour the mesh; the numbers are those in the shader. */
-export const MODES = { plain: 0, color: 1, value: 2, height: 3, tile: 4, level: 4, class: 5 };
+/** Ways to colour the mesh; the numbers are those in the shader. Values that are no numbers are grey. */
+export const MODES = { plain: 0, color: 1, value: 2, height: 3, tile: 4, level: 4, class: 5, signed: 6 };
 
 /** Values that all tiles of all meshes share. */
 export const shared = {
@@ -61,6 +62,9 @@ void cut() {
 	if ( dot( uCut.xyz, vView ) + uCut.w < 0.0 ) discard;
 }`;
 
+/** A colour in the shader. */
+const vec3 = hex => `vec3( ${ [ 0, 2, 4 ].map( at => ( parseInt( hex.slice( at, at + 2 ), 16 ) / 255 ).toFixed( 4 ) ).join( ', ' ) } )`;
+
 const FRAGMENT = /* glsl */`
 layout(location = 0) out vec4 outColor;
 ${ CUT }
@@ -82,6 +86,11 @@ vec3 ramp( float x ) {
 	float t = clamp( ( x - uRange.x ) / max( uRange.y - uRange.x, 1e-30 ), 0.0, 1.0 );
 	return texture( uRamp, vec2( t * 255.0 / 256.0 + 0.5 / 256.0, 0.5 ) ).rgb;
 }
+// Blue below the middle, red above it.
+vec3 signedRamp( float x ) {
+	float t = clamp( 2.0 * ( x - uRange.x ) / max( uRange.y - uRange.x, 1e-30 ) - 1.0, -1.0, 1.0 );
+	return mix( ${ vec3( SIGNED[ 1 ] ) }, t < 0.0 ? ${ vec3( SIGNED[ 0 ] ) } : ${ vec3( SIGNED[ 2 ] ) }, abs( t ) );
+}
 void main() {
 	cut();
 	vec3 face = normalize( cross( dFdx( vView ), dFdy( vView ) ) );
@@ -90,7 +99,8 @@ void main() {
 	if ( dot( n, face ) < 0.0 ) n = -n;
 	vec3 base = uFront;
 	if ( uMode == 1 ) base = encoded( vColor );
-	else if ( uMode == 2 ) base = ramp( vValue );
+	else if ( uMode == 2 ) base = isnan( vValue ) ? vec3( 0.55 ) : ramp( vValue );
+	else if ( uMode == 6 ) base = isnan( vValue ) ? vec3( 0.55 ) : signedRamp( vValue );
 	else if ( uMode == 3 ) base = ramp( vHeight );
 	else if ( uMode == 4 ) base = uTile;
 	else if ( uMode == 5 ) base = texture( uClasses, vec2( ( floor( vValue + 0.5 ) + 0.5 ) / 256.0, 0.5 ) ).rgb;

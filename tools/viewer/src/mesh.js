@@ -6,7 +6,7 @@ import { MeshoptDecoder } from 'meshoptimizer/decoder';
 import { TilesRenderer } from '3d-tiles-renderer/three';
 import { decimals } from './format.js';
 import { boundary, MODES, surface, wire } from './material.js';
-import { distinct } from './ramps.js';
+import { distinct, SIGNED_COLUMN } from './ramps.js';
 import { source } from './source.js';
 
 /** Linear light as sRGB, both from 0 to 1. */
@@ -247,7 +247,7 @@ export class MeshView {
 		this.mode = mode;
 		const name = mode.startsWith( 'column:' ) ? mode.slice( 7 ) : null, column = this.column( name );
 		const has = name ? column : mode !== 'color' || this.hasColors;
-		this.own.uMode.value = ! has ? 0 : name ? ( name === 'classification' ? MODES.class : MODES.value ) : MODES[ mode ] ?? 0;
+		this.own.uMode.value = ! has ? 0 : name ? ( name === 'classification' ? MODES.class : name === SIGNED_COLUMN ? MODES.signed : MODES.value ) : MODES[ mode ] ?? 0;
 		this.own.uShift.value = ( column?.offset ?? 0 ) - ( name ? offset : 0 );
 		this.#each( tile => tile.surface && this.#color( tile ) );
 		this.changed();
@@ -283,7 +283,10 @@ export class MeshView {
 
 		values.sort( ( a, b ) => a - b );
 		const cut = Math.floor( values.length / 100 );
-		return { low: values[ cut ] ?? 0, high: values[ values.length - 1 - cut ] ?? 1 };
+		const low = values[ cut ] ?? 0, high = values[ values.length - 1 - cut ] ?? 1;
+		// Nothing has changed in the middle of the ramp.
+		const most = Math.max( - low, high );
+		return mode === 'column:' + SIGNED_COLUMN ? { low: - most, high: most } : { low, high };
 
 	}
 

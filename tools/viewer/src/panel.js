@@ -3,7 +3,7 @@
 import { grouped, make, mib, plain, short } from './format.js';
 import { icon } from './icons.js';
 import { told } from './progress.js';
-import { CLASSES, classColor, rampCss } from './ramps.js';
+import { CLASSES, classColor, rampCss, SIGNED_COLUMN, signedCss } from './ramps.js';
 
 const $ = id => document.getElementById( id );
 
@@ -192,7 +192,7 @@ export class Panel {
 		const add = mode === 'height' ? mesh.info.origin[ 2 ] : mesh.offset( mode );
 		const digits = mode === 'height' ? Math.min( mesh.decimals, 3 ) : 3;
 		const bar = make( 'div', { className: 'bar' } );
-		bar.style.background = rampCss;
+		bar.style.background = name === SIGNED_COLUMN ? signedCss : rampCss;
 		const end = ( value, title ) => make( 'input', { type: 'text', inputMode: 'decimal', value: plain( value + add, digits ), title, 'aria-label': title, onchange: () => {
 
 			const [ low, high ] = [ ...$( 'legend' ).querySelectorAll( 'input' ) ].map( input => input.value.trim() === '' ? NaN : Number( input.value ) - add );

@@ -61,5 +61,14 @@ export const classTexture = () => row( n => CLASSES[ n ]
 	? bytes( CLASSES[ n ][ 1 ].slice( 1 ) )
 	: distinct( n ).map( x => Math.round( 255 * x ) ), NearestFilter );
 
+/** The column whose values have a sign: what `outcrop change` writes. */
+export const SIGNED_COLUMN = 'change';
+
+/** Colours for loss, no change and growth. */
+export const SIGNED = [ '2166ac', 'f0f0f0', 'b2182b' ];
+
+/** These as a background of CSS. */
+export const signedCss = `linear-gradient(to right, ${ SIGNED.map( hex => '#' + hex ).join( ', ' ) })`;
+
 /** The ramp as a background of CSS. */
 export const rampCss = `linear-gradient(to right, ${ VIRIDIS.map( hex => '#' + hex ).join( ', ' ) })`;

@@ -1,7 +1,7 @@
 //! The rows of a sorter, sorted: in memory, or in runs that are merged while they are read.
 
-use super::super::Row;
 use super::super::runs::{FILE_BUFFER, FRAME, Run, merge};
+use super::super::{Row, sort};
 use crate::error::Result;
 use crate::workspace::memory::Reservation;
 use crate::workspace::{Files, Workspace};
@@ -129,7 +129,7 @@ impl<R: Row> Sorted<R> {
     #[must_use]
     pub fn cuts(&self, records: usize) -> Vec<R> {
         let mut firsts: Vec<R> = self.runs.iter().flat_map(|r| &r.firsts).copied().collect();
-        firsts.sort_unstable_by(R::compare);
+        sort::sort(&mut firsts);
         let frames = (records / FRAME).max(1);
         let mut cuts: Vec<R> = firsts.into_iter().step_by(frames).skip(1).collect();
         cuts.dedup();

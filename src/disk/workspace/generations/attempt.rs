@@ -1,17 +1,19 @@
 //! The beginning of an attempt: at a shard, or at the work between two generations.
 
+use super::away::Sizes;
 use super::{Generation, Opened, Resources, SharedFolder, TRIES};
 use crate::error::{Error, Result};
 use crate::workspace::journal::{self, Entry, Journal, Record, Task};
 use crate::workspace::keeper::Keeper;
 use crate::workspace::make_folder;
-use crate::workspace::open::open_existing;
 use crate::workspace::run::{ResumableRun, Role};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::ErrorKind;
-use std::ops::Range;
 use std::path::{Path, PathBuf};
+
+/// Bytes of memory for what a thread fetches of a store at a time, and its copy.
+const FETCHING: u64 = 8 << 20;
 
 impl SharedFolder {
     /// Begins an attempt at a shard of a generation.
@@ -25,7 +27,7 @@ impl SharedFolder {
         resources: &Resources<'_>,
     ) -> Result<Opened> {
         let number = generation.number;
-        if !generation.is_left(shard) || self.done(number, shard).exists() {
+        if !generation.is_left(shard) || self.is_there(&self.done(number, shard))? {
             return Ok(Opened::Done);
         }
         let folder = self.tasks(number);
@@ -50,7 +52,8 @@ impl SharedFolder {
         for attempt in 0..TRIES {
             let path = path(attempt);
             match Journal::create(&path) {
-                Ok(journal) => return Ok((attempt, path, journal)),
+                Ok(journal) if self.claims(&path)? => return Ok((attempt, path, journal)),
+                Ok(_) => {}
                 Err(Error::Io { source, .. }) if source.kind() == ErrorKind::AlreadyExists => {}
                 Err(e) => return Err(e),
             }
@@ -83,6 +86,10 @@ impl SharedFolder {
         let many = || Error::not_resumable(&self.path, "it had too many attempts");
         let first = first.ok_or_else(many)?;
         let held = memory.reserve("history", generation.history.bytes())?;
+        let fetching = match &self.away {
+            Some(_) => memory.promise("scratch fetched", FETCHING * threads as u64)?,
+            None => memory.promise("scratch fetched", 0)?,
+        };
         let keeper = Keeper::start(journal.file(), &self.path, io.clone())
             .map_err(|e| Error::io(&path, "start a thread for", e))?;
         Ok(ResumableRun::new(
@@ -92,7 +99,8 @@ impl SharedFolder {
             (journal, past),
             keeper,
             (generation.history, held),
-        ))
+        )
+        .with_away(self.away.clone().map(|away| (away, fetching))))
     }
 
     /// Begins an attempt at the work between `generation` and the next: takes over what the tasks did.
@@ -139,9 +147,10 @@ impl SharedFolder {
         generation: &Generation,
     ) -> Result<(Vec<PathBuf>, Vec<u32>)> {
         let (mut done, mut missing) = (Vec::new(), Vec::new());
+        let sizes = self.sizes()?;
         for shard in 0..generation.sharing.shards {
             if generation.is_left(shard) {
-                match self.task_records(generation, shard, &generation.parts(shard))? {
+                match self.task_records(generation, shard, &sizes)? {
                     Some(path) => done.push(path),
                     None => missing.push(shard),
                 }
@@ -164,9 +173,13 @@ impl SharedFolder {
         &self,
         generation: &Generation,
         shard: u32,
-        parts: &[(String, Range<u64>)],
+        sizes: &Sizes,
     ) -> Result<Option<PathBuf>> {
         let path = self.done(generation.number, shard);
+        if !self.bring(&path)? {
+            return Ok(None);
+        }
+        let parts = generation.parts(shard);
         let expected = Task {
             run: generation.sharing.run,
             generation: generation.number,
@@ -201,15 +214,14 @@ impl SharedFolder {
             .flat_map(|(step, range)| range.clone().map(|unit| (step.clone(), unit)))
             .filter(|(step, unit)| generation.history.payload(step, *unit).is_none());
         let whole = |(name, end): (&String, &u64)| {
-            // Opening a file asks the server for its size; looking at it may not.
-            let file = open_existing(&self.path.join(name)).and_then(|file| file.metadata());
-            !name.contains('/') && file.is_ok_and(|meta| meta.len() >= *end)
+            !name.contains('/') && sizes.of(&self.path, name).is_some_and(|size| size >= *end)
         };
         let good = known && ended && wanted.all(|unit| units.contains(&unit));
         if good && ends.iter().all(whole) {
             return Ok(Some(path));
         }
-        std::fs::remove_file(&path).map_err(|e| Error::io(&path, "remove the damaged", e))?;
+        self.remove_file(&path)
+            .map_err(|e| Error::io(&path, "remove the damaged", e))?;
         Ok(None)
     }
 }

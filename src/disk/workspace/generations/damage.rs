@@ -25,6 +25,7 @@ impl SharedFolder {
         let places = Whereabouts {
             folder: &self.path,
             output: &output,
+            away: self.away.as_deref(),
         };
         let (done, _) = self.finished_tasks(generation)?;
         let end = recover(&mut generation.history, &places, observer, cancel)?;
@@ -64,6 +65,7 @@ impl SharedFolder {
                 why: why.into(),
                 damage: false,
             }))?;
+            self.put_again(&path)?;
         }
         Ok(())
     }

@@ -3,6 +3,7 @@
 use super::{GENERATIONS, MANIFEST, SharedFolder, Took};
 use crate::error::{Error, Result};
 use crate::workspace::Workspace;
+use crate::workspace::away::Away;
 use crate::workspace::fault::{self, Event};
 use crate::workspace::journal::{Failure, OpenStep, Record};
 use crate::workspace::listing::data;
@@ -21,8 +22,13 @@ impl SharedFolder {
     /// Deletes the segments of an attempt that failed, or that came too late. Its journal stays, so that it
     /// is counted.
     pub fn withdraw(&self, workspace: &Workspace) {
-        for path in workspace.segments_made() {
+        let made = workspace.segments_made();
+        for path in &made {
             let _ = std::fs::remove_file(path);
+        }
+        if let Some(away) = &self.away {
+            away.end_beat();
+            away.delete(&made);
         }
     }
 
@@ -33,6 +39,14 @@ impl SharedFolder {
     pub fn end_task(&self, workspace: &Workspace, task: (u64, u32), took: Took) -> Result<bool> {
         let path = workspace.seal(&[Record::Took(took)])?;
         let done = self.done(task.0, task.1);
+        if let Some(away) = &self.away {
+            let first = publish(away, &path, &done, workspace)?;
+            if first && self.is_over(task.0)? {
+                away.delete(&[done]);
+                return Ok(false);
+            }
+            return Ok(first);
+        }
         match link(&path, &done) {
             // The generation is over, and its folder is gone.
             Err(Error::Io { source, .. }) if source.kind() == ErrorKind::NotFound => Ok(false),
@@ -57,10 +71,19 @@ impl SharedFolder {
             false => Record::Open(workspace.take_open()),
         };
         let path = workspace.seal(&[Record::Took(took), end])?;
-        if !link(&path, &self.generation(number))? {
+        let generation = self.generation(number);
+        let first = match &self.away {
+            Some(away) => publish(away, &path, &generation, workspace)?,
+            None => link(&path, &generation)?,
+        };
+        if !first {
             return Ok(false);
         }
-        let _ = std::fs::remove_file(&path);
+        let _ = self.remove_file(&path);
+        if self.is_gone()? {
+            let _ = self.remove_file(&generation);
+            return Ok(false);
+        }
         if !finished {
             // What others have been told of must stay; what is not deleted now does no harm.
             let _ = self.clean(number);
@@ -71,16 +94,13 @@ impl SharedFolder {
     /// Deletes what no process of generation `number` needs. Names of generations stay, so that a process
     /// that was late cannot take one.
     fn clean(&self, number: u64) -> Result<()> {
+        if let Some(away) = &self.away {
+            return self.clean_away(away, number);
+        }
         let now = self.read(number)?;
         let needed = now.history.segments();
-        let over = |name: &String| {
-            let segment = name
-                .rsplit_once('.')
-                .and_then(|(_, n)| n.parse::<u32>().ok());
-            segment.is_some_and(|segment| segment < now.history.next_worker())
-        };
         let files = data(&self.path)?.into_iter();
-        for name in files.filter(|name| over(name) && !needed.contains(name)) {
+        for name in files.filter(|name| now.is_of_before(name) && !needed.contains(name)) {
             let _ = std::fs::remove_file(self.path.join(name));
         }
         for old in (0..number).rev() {
@@ -100,6 +120,9 @@ impl SharedFolder {
     /// Removes the folder of a finished run. What tells that this is its folder goes last, so that whoever
     /// is killed meanwhile can begin again.
     pub fn remove(&self) {
+        if let Some(away) = &self.away {
+            return self.remove_away(away);
+        }
         for _ in 0..REMOVALS {
             let last = [GENERATIONS, MANIFEST];
             remove_inside(&self.path, |name| !last.contains(&name));
@@ -120,8 +143,8 @@ impl SharedFolder {
     /// True if no generation is left: the folder is being removed, or its removal was interrupted.
     #[must_use]
     pub fn is_left_over(&self) -> bool {
-        let generations = std::fs::read_dir(self.path.join(GENERATIONS));
-        generations.is_ok_and(|mut names| names.next().is_none())
+        let generations = self.entries(&self.path.join(GENERATIONS));
+        generations.is_ok_and(|names| names.is_empty())
     }
 }
 
@@ -143,6 +166,15 @@ pub(super) fn sync(path: &Path) -> Result<()> {
         Err(e) if e.kind() != ErrorKind::NotFound => Err(Error::io(path, "sync", e)),
         _ => Ok(()),
     }
+}
+
+/// Puts a journal as the object that others look for; false if there is one.
+fn publish(away: &Away, from: &Path, to: &Path, workspace: &Workspace) -> Result<bool> {
+    fault::point(Event::Publish);
+    away.end_beat();
+    let first = away.publish(from, to, &workspace.memory)?;
+    fault::point(Event::Published);
+    Ok(first)
 }
 
 /// Gives a file a second name; false if it exists.
@@ -192,6 +224,10 @@ impl Workspace {
         let _ = run
             .journal()
             .append(Record::Failed(Failure { why, damage }));
+        if let Some(away) = run.away() {
+            away.end_beat();
+            let _ = away.put(run.journal().path());
+        }
         match damage {
             true => Ok(error),
             false => Err(error),
@@ -210,9 +246,16 @@ impl Workspace {
         for path in run.segments_made().iter().chain(&run.files_touched()) {
             sync(path)?;
         }
+        if let Some(away) = run.away() {
+            away.put_all(&run.segments_made(), &self.memory)?;
+        }
         let journal = run.journal();
         for record in records {
-            journal.append(record.clone())?;
+            let mut record = record.clone();
+            if let (Record::Took(took), Some(away)) = (&mut record, run.away()) {
+                took.traffic = away.traffic();
+            }
+            journal.append(record)?;
         }
         sync(journal.path())?;
         Ok(journal.path().to_path_buf())

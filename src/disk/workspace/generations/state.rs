@@ -1,9 +1,9 @@
 //! The state of shards, as far as their files tell.
 
+use super::away::Entry;
 use super::{Generation, SharedFolder};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::workspace::journal::{self, Failure, Record};
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
@@ -33,12 +33,12 @@ pub struct Attempts {
 
 impl Attempts {
     /// Adds the attempt with this journal.
-    fn add(&mut self, attempt: u32, path: &Path) {
+    fn add(&mut self, attempt: u32, entry: &Entry, folder: &SharedFolder) {
         self.count += 1;
-        let written = path.metadata().and_then(|meta| meta.modified()).ok();
-        self.written = self.written.max(written);
+        self.written = self.written.max(entry.modified);
         if self.failed.as_ref().is_none_or(|(last, _)| *last < attempt)
-            && let Some(why) = reason(path)
+            && let Ok(path) = folder.here(entry.path.clone())
+            && let Some(why) = reason(&path)
         {
             self.failed = Some((attempt, why));
         }
@@ -78,7 +78,7 @@ impl SharedFolder {
     /// The state of all shards of a generation.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`crate::error::Error::Io`].
     pub fn shards(&self, generation: &Generation) -> Result<Vec<Shard>> {
         let count = generation.sharing.shards;
         let state = |shard| match generation.is_left(shard) {
@@ -87,32 +87,25 @@ impl SharedFolder {
         };
         let mut shards: Vec<Shard> = (0..count).map(state).collect();
         let folder = self.tasks(generation.number);
-        let names = match std::fs::read_dir(&folder) {
-            Ok(names) => names,
-            Err(e) if e.kind() == ErrorKind::NotFound => return Ok(shards),
-            Err(e) => return Err(Error::io(&folder, "list", e)),
-        };
-        let mut names: Vec<String> = names
-            .filter_map(|name| name.ok()?.file_name().into_string().ok())
-            .collect();
+        let mut entries = self.entries(&folder)?;
         // Finished shards first, so that journals of their other attempts are not read.
-        names.sort_by_key(|name| !name.ends_with(".done"));
-        for name in names {
-            let Some((Ok(shard), end)) = name.split_once('.').map(|(n, e)| (n.parse(), e)) else {
+        entries.sort_by_key(|entry| !entry.name.ends_with(".done"));
+        for entry in &entries {
+            let name = entry.name.split_once('.');
+            let Some((Ok(shard), end)) = name.map(|(n, e)| (n.parse(), e)) else {
                 continue;
             };
             let shard: usize = shard;
             let Some(state) = shards.get_mut(shard) else {
                 continue;
             };
-            let path = folder.join(&name);
             match (&mut *state, end.parse()) {
                 (Shard::Done, _) => {}
                 (_, Err(_)) if end == "done" => *state = Shard::Done,
-                (Shard::Begun(attempts), Ok(attempt)) => attempts.add(attempt, &path),
+                (Shard::Begun(attempts), Ok(attempt)) => attempts.add(attempt, entry, self),
                 (_, Ok(attempt)) => {
                     let mut attempts = Attempts::default();
-                    attempts.add(attempt, &path);
+                    attempts.add(attempt, entry, self);
                     *state = Shard::Begun(attempts);
                 }
                 _ => {}
@@ -124,16 +117,14 @@ impl SharedFolder {
     /// The attempts to make the generation after this one.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`crate::error::Error::Io`].
     pub fn advances(&self, generation: &Generation) -> Result<Attempts> {
         let next = generation.number + 1;
-        let folder = self.path.join(super::GENERATIONS);
-        let names = std::fs::read_dir(&folder).map_err(|e| Error::io(&folder, "list", e))?;
         let prefix = format!("{next:06}.");
         let mut attempts = Attempts::default();
-        for name in names.filter_map(|name| name.ok()?.file_name().into_string().ok()) {
-            if let Some(Ok(attempt)) = name.strip_prefix(&prefix).map(str::parse) {
-                attempts.add(attempt, &folder.join(&name));
+        for entry in &self.entries(&self.path.join(super::GENERATIONS))? {
+            if let Some(Ok(attempt)) = entry.name.strip_prefix(&prefix).map(str::parse) {
+                attempts.add(attempt, entry, self);
             }
         }
         Ok(attempts)
@@ -164,7 +155,7 @@ impl SharedFolder {
     /// True if a process of this generation found the work of others damaged.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`crate::error::Error::Io`].
     pub fn is_damaged(&self, generation: &Generation) -> Result<bool> {
         let shards = self.shards(generation)?;
         let task =
@@ -177,7 +168,8 @@ impl SharedFolder {
     pub fn seconds(&self, generation: &Generation, done: &[u32]) -> Vec<f64> {
         let of = |shard: &u32| {
             let mut seconds = None;
-            journal::read(&self.done(generation.number, *shard), None, |entry| {
+            let path = self.here(self.done(generation.number, *shard)).ok()?;
+            journal::read(&path, None, |entry| {
                 if let Record::Took(took) = entry.record {
                     seconds = Some(took.seconds);
                 }
@@ -192,6 +184,6 @@ impl SharedFolder {
     /// The time when a generation began.
     #[must_use]
     pub fn begun(&self, number: u64) -> Option<SystemTime> {
-        self.generation(number).metadata().ok()?.modified().ok()
+        self.modified(&self.generation(number))
     }
 }

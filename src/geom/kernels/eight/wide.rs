@@ -165,6 +165,47 @@ impl Eight for Avx2 {
         // SAFETY: see above.
         unsafe { total(_mm256_add_pd(self.0.0, self.1.0)) }
     }
+
+    #[inline(always)]
+    fn totals<const N: usize>(first: [Four; N], last: [Four; N]) -> [f64; N] {
+        let mut totals = [0.0; N];
+        let mut start = 0;
+        while start < N {
+            let mut some = [Four::splat(0.0); 4];
+            for (to, (first, last)) in some.iter_mut().zip(first.iter().zip(&last).skip(start)) {
+                *to = *first + *last;
+            }
+            for (to, total) in totals[start..].iter_mut().zip(totals_of_four(some)) {
+                *to = total;
+            }
+            start += 4;
+        }
+        totals
+    }
+}
+
+/// For each vector the sum of its numbers: (a0 + a2) + (a1 + a3).
+#[inline(always)]
+fn totals_of_four([a, b, c, d]: [Four; 4]) -> [f64; 4] {
+    // The two halves of two vectors, side by side.
+    #[inline(always)]
+    fn halves(a: Four, b: Four) -> Four {
+        // SAFETY: see above.
+        unsafe {
+            let low = _mm256_permute2f128_pd::<0x20>(a.0, b.0);
+            let high = _mm256_permute2f128_pd::<0x31>(a.0, b.0);
+            Four(_mm256_add_pd(low, high))
+        }
+    }
+    let (even, odd) = (halves(a, c), halves(b, d));
+    let mut totals = [0.0; 4];
+    // SAFETY: see above.
+    unsafe {
+        let first = _mm256_unpacklo_pd(even.0, odd.0);
+        let last = _mm256_unpackhi_pd(even.0, odd.0);
+        _mm256_storeu_pd(totals.as_mut_ptr(), _mm256_add_pd(first, last));
+    }
+    totals
 }
 
 /// The sum of four numbers: (a0 + a2) + (a1 + a3).
@@ -283,4 +324,55 @@ impl Eight for Avx512 {
             total(_mm256_add_pd(low, _mm512_extractf64x4_pd::<1>(self.0)))
         }
     }
+
+    #[inline(always)]
+    fn totals<const N: usize>(first: [Self; N], _: [Self; N]) -> [f64; N] {
+        let mut totals = [0.0; N];
+        let mut start = 0;
+        while start < N {
+            let mut some = [Self::splat(0.0); 8];
+            for (to, from) in some.iter_mut().zip(first.iter().skip(start)) {
+                *to = *from;
+            }
+            for (to, total) in totals[start..].iter_mut().zip(totals_of_eight(some)) {
+                *to = total;
+            }
+            start += 8;
+        }
+        totals
+    }
+}
+
+/// For each vector the sum of its numbers, as [`Eight::total`]: in each step the halves of two vectors stand side
+/// by side and are added.
+#[inline(always)]
+fn totals_of_eight(of: [Avx512; 8]) -> [f64; 8] {
+    #[inline(always)]
+    fn halves(a: Avx512, b: Avx512) -> Avx512 {
+        // SAFETY: see above.
+        unsafe {
+            let low = _mm512_shuffle_f64x2::<0x44>(a.0, b.0);
+            let high = _mm512_shuffle_f64x2::<0xee>(a.0, b.0);
+            Avx512(_mm512_add_pd(low, high))
+        }
+    }
+    #[inline(always)]
+    fn quarters(a: Avx512, b: Avx512) -> Avx512 {
+        // SAFETY: see above.
+        unsafe {
+            let low = _mm512_shuffle_f64x2::<0x88>(a.0, b.0);
+            let high = _mm512_shuffle_f64x2::<0xdd>(a.0, b.0);
+            Avx512(_mm512_add_pd(low, high))
+        }
+    }
+    let even = quarters(halves(of[0], of[2]), halves(of[4], of[6]));
+    let odd = quarters(halves(of[1], of[3]), halves(of[5], of[7]));
+    let mut totals = [0.0; 8];
+    // SAFETY: see above.
+    unsafe {
+        let first = _mm512_unpacklo_pd(even.0, odd.0);
+        let last = _mm512_unpackhi_pd(even.0, odd.0);
+        _mm512_storeu_pd(totals.as_mut_ptr(), _mm512_add_pd(first, last));
+    }
+    totals
 }

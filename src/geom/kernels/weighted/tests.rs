@@ -26,7 +26,7 @@ fn all_of(level: Level, columns: [&[i32]; 3], count: usize) -> Vec<f64> {
     found.extend(lane(&sums));
     square_weights(level, &all, &mut sums, LANE);
     found.extend(lane(&sums));
-    fade(level, &all, &surface, 0.2, &mut sums, LANE);
+    fade(level, &mut all, &surface, 0.2, &mut sums, LANE);
     found.extend(lane(&sums));
     // The other lanes are left alone.
     let others = spread.iter().chain(&sums).flat_map(|of| &of[..LANE]);

@@ -72,6 +72,36 @@ impl Around {
         self.end();
     }
 
+    /// Keeps the `count` that come first by distance, then by id, and the point itself, all without their ids;
+    /// `keys` are reused.
+    pub fn keep_nearest(&mut self, count: usize, keys: &mut Vec<(u64, usize)>) {
+        if self.count <= count + 1 {
+            return;
+        }
+        keys.clear();
+        keys.extend((0..self.count).map(|place| self.key(place)));
+        // The point itself is one of them, or all are in its place.
+        let (_, last, _) = keys.select_nth_unstable(count);
+        let last = *last;
+        let mut kept = 0;
+        for place in 0..self.count {
+            if self.key(place) <= last {
+                for column in &mut self.columns {
+                    column[kept] = column[place];
+                }
+                kept += 1;
+            }
+        }
+        (self.count, self.last2) = (kept, last.0);
+        self.end();
+    }
+
+    /// Squared distance and place of a point.
+    fn key(&self, place: usize) -> (u64, usize) {
+        let difference = self.columns.each_ref().map(|c| c[place] as i32);
+        (distance2(difference, [0; 3]), place)
+    }
+
     /// Makes room for `count` points and the rest of a block.
     fn reserve(&mut self, count: usize) {
         let room = count.next_multiple_of(8) + BLOCK;
@@ -91,21 +121,21 @@ impl Around {
 
 impl Tile {
     /// Calls `each` with every point whose id is `wanted` and its `k` nearest neighbours, in order of id; with
-    /// `None` if the halo cannot certify these neighbours.
+    /// `None` if the halo cannot certify these neighbours. `each` may swap them for others.
     pub fn for_some_around(
         &self,
         k: usize,
         search: &mut Search,
         wanted: impl Fn(usize) -> bool,
         grown: impl FnMut(u64),
-        mut each: impl FnMut(Id, Point, Option<&Around>),
+        mut each: impl FnMut(Id, Point, Option<&mut Around>),
     ) {
         let mut around = Around::default();
         self.for_groups(k, search, wanted, grown, |own, index, id, search| {
             let known = self.around(own, index, id, k, search, &mut around);
-            let around = known.then_some(&around);
-            each(id, self.points.get(index), around);
-            around.map_or(0, Around::last2)
+            let last2 = if known { around.last2() } else { 0 };
+            each(id, self.points.get(index), known.then_some(&mut around));
+            last2
         });
     }
 

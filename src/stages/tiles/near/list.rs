@@ -31,7 +31,13 @@ impl Search {
     /// Lists the picked candidates within `limit` in order of (distance, id). Returns the squared distance up
     /// to which all are listed.
     #[inline(always)]
-    fn list_picked<P: Pick>(&mut self, picked: usize, point: Point, own: u32, limit: f32) -> u64 {
+    pub(super) fn list_picked<P: Pick>(
+        &mut self,
+        picked: usize,
+        point: Point,
+        own: u32,
+        limit: f32,
+    ) -> u64 {
         let below = (f64::from(limit) * (1.0 - APPROXIMATE)) as u64;
         let complete2 = below.min(self.candidates.complete2);
         let bits = usize::BITS - picked.leading_zeros();

@@ -13,8 +13,9 @@ use outcrop_geom::plane::Moments;
 /// Most corrections of the limit that separates the nearest from the others.
 const DIVISIONS: usize = 16;
 
-/// Up to this many numbers, several limits are tried at once.
-const FEW: usize = 4 * BLOCK;
+/// Up to the last of these counts of numbers, several limits are tried at once: on whole registers, for twice
+/// as many neighbours as a plane has as well.
+const FEW: [usize; 3] = [4 * BLOCK, 6 * BLOCK, 8 * BLOCK];
 
 /// The limits that are tried first: distances from the expected one, in mean gaps between numbers.
 const FIRST_PROBES: [f32; 4] = [-2.5, -0.8, 0.8, 2.5];
@@ -169,7 +170,7 @@ pub(super) fn divided_body<P: Pick, const IDS: bool>(
         return Err(Unknown::Few);
     }
     let room = picked.next_multiple_of(BLOCK);
-    let padded = room.max(FEW);
+    let padded = FEW.into_iter().find(|few| room <= *few).unwrap_or(room);
     search
         .distances
         .resize(padded.max(search.distances.len()), 0.0);
@@ -196,16 +197,26 @@ pub(super) fn certain_body(limit: f32) -> f64 {
 #[inline(always)]
 fn divide_body<P: Pick>(numbers: &[f32], count: usize, wanted: usize, most: f32) -> Option<f32> {
     let (all, wanted) = (count as u32, wanted as u32);
-    match numbers.first_chunk() {
-        Some(few) if count <= FEW => divide_few::<P>(few, all, wanted, most),
-        _ => divide_many::<P>(numbers, all, wanted, most),
+    if let Ok(few) = numbers.try_into() {
+        divide_few::<P, { FEW[0] }>(few, all, wanted, most)
+    } else if let Ok(few) = numbers.try_into() {
+        divide_few::<P, { FEW[1] }>(few, all, wanted, most)
+    } else if let Ok(few) = numbers.try_into() {
+        divide_few::<P, { FEW[2] }>(few, all, wanted, most)
+    } else {
+        divide_many::<P>(numbers, all, wanted, most)
     }
 }
 
 /// As [`divide_body`], by probes: of the limits tried in a round, the two next to the wanted one are where the
 /// next round begins.
 #[inline(always)]
-fn divide_few<P: Pick>(numbers: &[f32; FEW], count: u32, wanted: u32, most: f32) -> Option<f32> {
+fn divide_few<P: Pick, const FEW: usize>(
+    numbers: &[f32; FEW],
+    count: u32,
+    wanted: u32,
+    most: f32,
+) -> Option<f32> {
     let (mut low, mut high) = (0.0, most);
     let (mut below, mut above) = (0, count);
     let mut steps = FIRST_PROBES;

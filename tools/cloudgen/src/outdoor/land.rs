@@ -2,6 +2,7 @@
 
 use std::f64::consts::PI;
 
+use super::epoch::{Changes, FELLED};
 use super::{OUTDOOR_SIDE, Objects};
 use crate::rng::{Purpose, Rng};
 
@@ -60,6 +61,8 @@ pub(crate) struct Land {
     pub trees: Vec<Tree>,
     pub walls: Vec<Wall>,
     pub wires: Vec<Wire>,
+    /// What changed since the first survey.
+    pub changes: Option<Changes>,
 }
 
 impl Land {
@@ -95,18 +98,26 @@ impl Land {
         let stream = move |group: u64| {
             move |number: u64| Rng::at(seed, Purpose::Object, group << 32 | number)
         };
-        Land {
+        let mut land = Land {
             houses: (0..HOUSES).map(stream(0)).map(house).collect(),
             trees: (0..objects.trees.into()).map(stream(1)).map(tree).collect(),
             walls: (0..WALLS).map(stream(2)).map(wall).collect(),
             wires: (0..objects.wires.into()).map(stream(3)).map(wire).collect(),
+            changes: None,
+        };
+        if objects.epoch {
+            let changes = Changes::new(&land.discs(), stream(4));
+            land.houses.push(changes.new_house());
+            land.trees.drain(..FELLED.min(land.trees.len()));
+            land.changes = Some(changes);
         }
+        land
     }
 
     /// Discs (x, y, radius) around all houses, trees and walls, with a margin. Ground outside is open. Wires
     /// are too high to matter.
     pub(crate) fn discs(&self) -> Vec<[f64; 3]> {
-        let mut discs = Vec::new();
+        let mut discs: Vec<_> = self.changes.iter().flat_map(Changes::discs).collect();
         for house in &self.houses {
             let [x, y] = house.centre;
             discs.push([x, y, house.width.max(house.depth) * 0.75 + 2.0]);
@@ -203,6 +214,7 @@ mod tests {
             trees: 800,
             wires: 4,
             wall_height: Some(0.3),
+            epoch: false,
         };
         let many = Land::new(3, &objects);
         assert_eq!((few.trees.len(), many.trees.len()), (400, 800));

@@ -1,10 +1,12 @@
 //! An aerial scan of hilly land: ground, houses, trees, walls, wires. Open ground is a height field, so it
 //! faces up and has no boundary.
 
+mod epoch;
 mod land;
 mod measure;
 mod points;
 
+pub use epoch::{Changes, HEAP_VOLUME, PIT_VOLUME};
 pub(crate) use land::Land;
 pub use measure::GroundReport;
 pub(crate) use measure::measure;
@@ -31,6 +33,9 @@ pub struct Objects {
     pub wires: u32,
     /// Height of the free-standing walls; None for heights from 1 to 3.
     pub wall_height: Option<f64>,
+    /// True for a second survey, after a pit was dug, a heap and a house were made, and ten trees were felled. Its points
+    /// are others; all else is the land of the first survey.
+    pub epoch: bool,
 }
 
 impl Default for Objects {
@@ -39,6 +44,7 @@ impl Default for Objects {
             trees: 400,
             wires: 0,
             wall_height: None,
+            epoch: false,
         }
     }
 }

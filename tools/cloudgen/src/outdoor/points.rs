@@ -1,5 +1,6 @@
 //! The points: ground and objects.
 
+use super::epoch::Changes;
 use super::land::{House, Land, Tree, Wall, Wire, between};
 use super::{HIGHEST_WALL, OUTDOOR_SIDE, height, slopes};
 use crate::rng::Rng;
@@ -49,6 +50,7 @@ pub(crate) struct Outdoor {
     starts: Vec<u64>,
     parts: Vec<Part>,
     spacing: f64,
+    changes: Option<Changes>,
 }
 
 impl Outdoor {
@@ -83,6 +85,7 @@ impl Outdoor {
             houses: land.houses.clone(),
             parts,
             spacing: OUTDOOR_SIDE / root,
+            changes: land.changes,
         }
     }
 
@@ -131,8 +134,11 @@ impl Outdoor {
         }
         let [x, y] = place;
         let [slope_x, slope_y] = slopes(x, y);
+        let changes = self.changes.map(|changes| changes.rise(place));
+        let (rise, [more_x, more_y]) = changes.unwrap_or_default();
+        let (slope_x, slope_y) = (slope_x + more_x, slope_y + more_y);
         Sample {
-            position: [x, y, height(x, y)],
+            position: [x, y, height(x, y) + rise],
             normal: normalize([-slope_x, -slope_y, 1.0]),
         }
     }

@@ -3,9 +3,9 @@
 use super::binary::{PLAIN, plain};
 use super::{MeshStream, Role, SLICE, index};
 use crate::error::FileError;
-use crate::header::bytes_of;
+use crate::header::{Element, bytes_of};
 use crate::numbers::{integer, real};
-use crate::types::Scalar;
+use crate::types::{Property, Scalar};
 use outcrop_platform::FileAt;
 use std::fs::File;
 use std::path::PathBuf;
@@ -28,6 +28,8 @@ pub struct FixedMesh {
     vertices: Entries,
     /// Bytes before each coordinate in its entry, and its type.
     axes: [(usize, Scalar); 3],
+    /// Bytes before each property of a vertex in its entry, and its type.
+    properties: Vec<(usize, Scalar)>,
     faces: Entries,
     /// Number of faces.
     count: u64,
@@ -35,6 +37,16 @@ pub struct FixedMesh {
     list: (usize, Scalar, Scalar),
     /// True if the file ends where it does if all faces are triangles.
     fits: bool,
+}
+
+/// The types of the properties of an element whose entries have one size.
+fn scalars(element: &Element) -> impl Iterator<Item = Scalar> {
+    let properties = element.properties.iter();
+    properties.map(|(_, property)| match property {
+        Property::One(scalar) => *scalar,
+        // There is none: entries with lists have no size.
+        Property::List { count, .. } => *count,
+    })
 }
 
 impl MeshStream {
@@ -48,6 +60,7 @@ impl MeshStream {
             return Ok(None);
         };
         let (mut at, mut vertices, mut faces) = (self.header.bytes, None, None);
+        let mut properties = Vec::new();
         for element in &self.header.elements {
             let role = Role::of(element).map_err(|e| self.source.wrong(e))?;
             let each = match role {
@@ -67,6 +80,7 @@ impl MeshStream {
                     };
                     let place = |(at, s)| (element.bytes_before(at).unwrap_or(0), s);
                     vertices = Some((Entries { at, each }, axes.map(place)));
+                    properties = scalars(element).enumerate().map(place).collect();
                     each
                 }
                 Role::Other => match element.record_bytes() {
@@ -89,6 +103,7 @@ impl MeshStream {
             big,
             vertices,
             axes,
+            properties,
             faces,
             count: self.faces(),
             list,
@@ -166,6 +181,14 @@ impl FixedMesh {
             }
         }
         Ok(())
+    }
+
+    /// The values of a column of the vertices that [`FixedMesh::positions`] read last, from the `bytes` that it left:
+    /// the index of the column is that of [`MeshStream::columns`].
+    pub fn values<'a>(&'a self, bytes: &'a [u8], column: usize) -> impl Iterator<Item = f64> + 'a {
+        let (at, scalar) = self.properties[column];
+        let rows = bytes.chunks_exact(self.vertices.each);
+        rows.map(move |row| real(scalar, &row[at..], self.big))
     }
 
     /// True if all faces are triangles.
