@@ -166,6 +166,9 @@ impl Reconstruction {
     pub fn work(&self, generation: Option<u64>, shard: u32) -> Result<Worked> {
         let begin = Instant::now();
         let folder = place::open(&self.folder, &self.copies)?;
+        if folder.is_left_over() {
+            return Ok(Worked::Superseded);
+        }
         let newest = folder.newest()?;
         let number = generation.unwrap_or(newest);
         if number < newest {

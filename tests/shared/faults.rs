@@ -287,6 +287,11 @@ fn what_is_left_of_a_finished_run_is_removed() {
     for name in generations {
         std::fs::remove_file(case.scratch.join("generations").join(name)).unwrap();
     }
+    let said = case.say("status", &["--missing"]);
+    assert!(said.code == Some(0) && said.out.is_empty(), "{said:?}");
+    let said = case.say("status", &["--json"]);
+    assert!(said.out.contains("\"finished\": true"), "{said:?}");
+    case.work(0);
     let said = case.say("advance", &[]);
     assert!(
         said.code == Some(0) && said.out.contains("finished"),

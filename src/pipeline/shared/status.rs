@@ -34,7 +34,7 @@ const STAGES: [(&str, f64); 11] = [
 ];
 
 /// The state of a run that tasks share.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct Status {
     /// The folder of the run.
     pub folder: PathBuf,
@@ -234,34 +234,33 @@ impl Status {
 /// [`crate::Error::NotResumable`], [`crate::Error::Io`], [`crate::Error::Corrupt`].
 pub fn status(path: &Path) -> Result<Status> {
     let folder = place::open(path, &Copies::default())?;
-    let manifest = Manifest::from_bytes(path, &folder.manifest)?;
+    let output = Manifest::from_bytes(path, &folder.manifest)?.output();
+    let status = Status {
+        folder: path.to_path_buf(),
+        output,
+        ..Status::default()
+    };
+    if folder.is_left_over() {
+        // Its removal was interrupted, after the mesh was finished.
+        return Ok(Status {
+            finished: true,
+            ..status
+        });
+    }
     let generation = folder.read(folder.newest()?)?;
     let now = SystemTime::now();
+    let steps = generation.open.iter();
     let mut status = Status {
-        folder: path.to_path_buf(),
-        output: manifest.output(),
         generation: generation.number,
-        steps: generation
-            .open
-            .iter()
-            .map(|OpenStep { step, .. }| step.clone())
-            .collect(),
+        steps: steps.map(|OpenStep { step, .. }| step.clone()).collect(),
         shards: generation.sharing.shards,
         task_threads: generation.sharing.threads,
         task_memory: generation.sharing.memory,
         units: generation.units(),
-        done: Vec::new(),
-        begun: Vec::new(),
-        new: Vec::new(),
-        advance: None,
         damaged: folder.is_damaged(&generation)?,
-        can_advance: false,
         finished: generation.finished,
-        points: None,
-        points_per_second: None,
-        step_seconds_left: None,
-        seconds_left: None,
         totals: Totals::of(&generation.took),
+        ..status
     };
     for (shard, state) in (0..).zip(folder.shards(&generation)?) {
         match state {
