@@ -50,7 +50,8 @@
 //! [`convert`] writes a finished mesh in another format.
 //!
 //! [`Closing`] closes the boundary of a mesh of any size, [`Simplification`] makes one mesh with fewer triangles of it, and [`Tiles`] levels of detail for
-//! viewers of 3D Tiles. [`Rasterization`] makes rasters of heights.
+//! viewers of 3D Tiles. [`ChangeDetection`] measures what changed between two surfaces, and [`Rasterization`] makes
+//! rasters of heights.
 //!
 //! [`inspect`] describes a cloud, checks that a mesh is a manifold, and measures volumes, heights, and the distance between two
 //! shapes. [`Report`] has the counts and measurements of a run. [`page`] puts all of these into pages with
@@ -107,7 +108,7 @@ pub use params::{
     Smoothing,
 };
 pub use pipeline::{
-    Builder, Rasterization, Reconstruction, Start, default_memory, default_threads,
+    Builder, ChangeDetection, Rasterization, Reconstruction, Start, default_memory, default_threads,
 };
 #[cfg(feature = "levels")]
 pub use pipeline::{Closing, Simplification, Tiles};

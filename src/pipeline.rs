@@ -31,9 +31,7 @@ use crate::params::Params;
 use crate::report::Report;
 use attempt::Alarm;
 pub use builder::Builder;
-pub use change::change;
-#[cfg(feature = "pages")]
-pub use change::illustrated_change;
+pub use change::ChangeDetection;
 use checks::{not_an_input, one_system, writable};
 pub(crate) use clock::Clock;
 #[cfg(feature = "levels")]

@@ -275,6 +275,8 @@ def change(
     io: str = "auto",
     scratch_compression: Union[int, str] = "auto",
     quiet: bool = False,
+    resume: bool = False,
+    restart: bool = False,
 ) -> Answer:
     """Measures what changed from one surface, a :class:`Mesh`, a file, a folder or an array, to a new mesh."""
     options = dict(locals())

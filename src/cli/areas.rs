@@ -36,7 +36,7 @@ impl<'a> File<'a> {
 
     /// Writes it.
     pub fn write(self, change: &Change) -> Result<()> {
-        let areas = &change.areas.areas;
+        let areas = &change.areas;
         let text = match self.is_table {
             true => table(areas),
             false => polygons(areas).to_string() + "\n",

@@ -11,7 +11,7 @@ use crate::features::LEVELS;
 use crate::info;
 use crate::params::Params;
 use crate::pipeline::{
-    self, Builder, Rasterization, Reconstruction, default_memory, default_threads,
+    Builder, ChangeDetection, Rasterization, Reconstruction, default_memory, default_threads,
 };
 #[cfg(feature = "levels")]
 use crate::pipeline::{Closing, Simplification, Tiles};
@@ -182,31 +182,6 @@ pub fn compare(args: &Compare, watch: Watch) -> Result<compare::Comparison> {
     pages::compare(page, [a, b], &options, &workspace)
 }
 
-/// Measures what changed from one surface to another.
-pub fn change(args: &Change, watch: Watch) -> Result<change::Change> {
-    local(&args.new)?;
-    let workspace = workspace(&args.limits, watch)?;
-    let options = change::Options {
-        radius: args.radius,
-        farthest: args.farthest,
-        registration: args.registration,
-    };
-    let areas = args.areas.as_deref().map(areas::File::new).transpose()?;
-    let output = args.output.as_deref();
-    let surfaces = [args.old.as_path(), &args.new];
-    let found = match &args.html {
-        None => pipeline::change(surfaces, output, &options, &workspace)?,
-        Some(path) => {
-            let page = NewFile::page(path)?;
-            pages::change(page, surfaces, output, &options, &workspace)?
-        }
-    };
-    if let Some(areas) = areas {
-        areas.write(&found)?;
-    }
-    Ok(found)
-}
-
 /// Measures volumes.
 pub fn volume(args: &Volume, watch: Watch) -> Result<Volumes> {
     local(&args.mesh)?;
@@ -214,8 +189,8 @@ pub fn volume(args: &Volume, watch: Watch) -> Result<Volumes> {
     volume::volume(&args.mesh, &args.options(), &workspace)
 }
 
-/// Runs a job on a mesh or a cloud within the limits of the command line.
-macro_rules! run_within {
+/// A job on meshes or clouds within the limits of the command line.
+macro_rules! within {
     ($job:ident, $args:ident, $observer:ident, $cancel:ident) => {{
         let job = $job
             .memory(memory(&$args.limits))
@@ -225,16 +200,42 @@ macro_rules! run_within {
             .observer($observer)
             .cancel($cancel);
         match &$args.limits.scratch {
-            Some(scratch) => job.scratch(scratch).run(),
-            None => job.run(),
+            Some(scratch) => job.scratch(scratch),
+            None => job,
         }
     }};
+}
+
+/// Measures what changed from one surface to another.
+pub fn change(args: &Change, (observer, cancel): Watch) -> Result<change::Change> {
+    local(&args.new)?;
+    let options = change::Options {
+        radius: args.radius,
+        farthest: args.farthest,
+        registration: args.registration,
+    };
+    let areas = args.areas.as_deref().map(areas::File::new).transpose()?;
+    let page = args.html.as_deref().map(NewFile::page).transpose()?;
+    let job = ChangeDetection::new(&args.old, &args.new, options);
+    let job = match &args.output {
+        Some(output) => job.output(output),
+        None => job,
+    };
+    let job = within!(job, args, observer, cancel);
+    let found = match page {
+        None => job.run()?,
+        Some(page) => pages::change(page, &job)?,
+    };
+    if let Some(areas) = areas {
+        areas.write(&found)?;
+    }
+    Ok(found)
 }
 
 /// Makes a raster of heights.
 pub fn raster(args: &Raster, (observer, cancel): Watch) -> Result<raster::Raster> {
     let job = Rasterization::new(&args.source, args.options());
-    run_within!(job, args, observer, cancel)
+    within!(job, args, observer, cancel).run()
 }
 
 /// Makes a mesh with fewer triangles.
@@ -258,7 +259,7 @@ pub fn simplify(args: &Simplify, (observer, cancel): Watch) -> Result<SimplifyRe
         .options(options)
         .samples(args.samples)
         .close(args.close);
-    run_within!(job, args, observer, cancel)
+    within!(job, args, observer, cancel).run()
 }
 
 /// The answer of a build without levels of detail.
@@ -272,7 +273,7 @@ pub fn simplify(_: &Simplify, _: Watch) -> Result<SimplifyReport> {
 pub fn close(args: &Close, (observer, cancel): Watch) -> Result<CloseReport> {
     local(&args.mesh)?;
     let job = Closing::new(&args.mesh, &args.output).kind(args.kind);
-    run_within!(job, args, observer, cancel)
+    within!(job, args, observer, cancel).run()
 }
 
 /// The answer of a build without levels of detail.
@@ -292,7 +293,7 @@ pub fn tiles(args: &TilesArgs, (observer, cancel): Watch) -> Result<TilesReport>
         most_triangles: args.most_triangles,
     };
     let tiles = Tiles::new(&args.mesh, &args.output).options(options);
-    run_within!(tiles, args, observer, cancel)
+    within!(tiles, args, observer, cancel).run()
 }
 
 #[cfg(not(feature = "levels"))]

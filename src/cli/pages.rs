@@ -9,8 +9,9 @@ pub use made::{change, compare, info, report, verify};
 mod made {
     use super::super::output::NewFile;
     use crate::params::Params;
+    use crate::pipeline::ChangeDetection;
     use crate::report::Report;
-    use crate::{info, page, pipeline};
+    use crate::{info, page};
     use outcrop_disk::error::Result;
     use outcrop_disk::workspace::Workspace;
     use outcrop_inspect::{change, compare, verify};
@@ -58,16 +59,8 @@ mod made {
     }
 
     /// Measures what changed from one surface to another.
-    pub fn change(
-        file: NewFile<'_>,
-        surfaces: [&Path; 2],
-        output: Option<&Path>,
-        options: &change::Options,
-        workspace: &Workspace,
-    ) -> Result<change::Change> {
-        let (found, drawn) = pipeline::illustrated_change(surfaces, output, options, workspace)?;
-        file.write(&page::change(&found, &drawn))?;
-        Ok(found)
+    pub fn change(file: NewFile<'_>, job: &ChangeDetection) -> Result<change::Change> {
+        job.run_illustrated(|found, drawn| file.write(&page::change(found, drawn)))
     }
 }
 
@@ -77,10 +70,11 @@ mod absent {
     use crate::features::PAGES;
     use crate::info::Info;
     use crate::params::Params;
+    use crate::pipeline::ChangeDetection;
     use crate::report::Report;
     use outcrop_disk::error::Result;
     use outcrop_disk::workspace::Workspace;
-    use outcrop_inspect::change::{self, Change};
+    use outcrop_inspect::change::Change;
     use outcrop_inspect::compare::{self, Comparison};
     use outcrop_inspect::verify::{self, Verdict};
     use std::path::{Path, PathBuf};
@@ -106,13 +100,7 @@ mod absent {
         Err(PAGES.missing())
     }
 
-    pub fn change(
-        _: NewFile<'_>,
-        _: [&Path; 2],
-        _: Option<&Path>,
-        _: &change::Options,
-        _: &Workspace,
-    ) -> Result<Change> {
+    pub fn change(_: NewFile<'_>, _: &ChangeDetection) -> Result<Change> {
         Err(PAGES.missing())
     }
 }

@@ -56,14 +56,13 @@ fn scale(top: f64) -> Markup {
 fn cards(change: &Change) -> Markup {
     let one = |name: &str, value: f64, more: &Markup| card(name, &html! { (length(value)) }, more);
     let share = percent(change.significant_area, change.compared_area);
-    let areas = &change.areas;
     html! {
         div.cards {
             (one("Volume gained", change.gained, &html! { "where the change is significant" }))
             (one("Volume lost", change.lost, &html! { "likewise" }))
             (one("Changed area", change.significant_area, &html! { (share) " of what was compared" }))
-            (card("Connected areas", &count(areas.areas.len() as u64), &html! {
-                "and " (count(areas.small_vertices)) " vertices in smaller ones"
+            (card("Connected areas", &count(change.areas.len() as u64), &html! {
+                "and " (count(change.small_vertices)) " vertices in smaller ones"
             }))
             (one("Only new", change.only_new_area, &html! { "area" }))
             @if let Some(area) = change.only_old_area { (one("Only old", area, &html! { "area" })) }
@@ -90,7 +89,7 @@ fn measurement(change: &Change, illustration: &Illustration) -> Markup {
 }
 
 fn areas(change: &Change) -> Markup {
-    let all = &change.areas.areas;
+    let all = &change.areas;
     let row = |area: &Area| {
         let largest = area.largest.map_or("only new".to_owned(), length);
         let place = area.largest_at.map(|x| format!("{x:.2}")).join("  ");
@@ -115,8 +114,8 @@ fn areas(change: &Change) -> Markup {
             "Vertices that changed in the same direction and are joined by edges, the largest volume first; the place is "
             "that of the largest change. "
             @if all.len() > MOST { (count((all.len() - MOST) as u64)) " more are not listed. " }
-            "Areas of fewer than 30 vertices have together an area of " (length(change.areas.small_area))
-            ", gained " (length(change.areas.small_gained)) " and lost " (length(change.areas.small_lost))
+            "Areas of fewer than 30 vertices have together an area of " (length(change.small_area))
+            ", gained " (length(change.small_gained)) " and lost " (length(change.small_lost))
             ". Lengths in the files' unit, areas and volumes in its square and cube."
         }
     }

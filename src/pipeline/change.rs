@@ -1,14 +1,19 @@
 //! What changed from one surface to another, as columns of the new mesh.
 
+use super::Start;
 use super::like::{Like, is_one_of};
+use super::mesh_job::MeshJob;
+use super::resources::{Resources, resource_setters};
 use crate::write::{Bounds, Writer, write};
 use outcrop_codecs::ply_mesh::{PlyMesh, Sink};
 use outcrop_disk::error::{Error, Result};
-use outcrop_disk::workspace::Workspace;
+use outcrop_disk::workspace::progress::{Cancel, Observer};
+use outcrop_disk::workspace::{Storage, Workspace};
 use outcrop_inspect::change::{self, Change, ChangeRow, Changes, Options, ROWS, State};
 use outcrop_mesh_files::export::{self, VertexColumn};
 use outcrop_ply::Scalar;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// The columns of a map: lengths in the unit of the files, and a [`State`] as a number.
 const COLUMNS: [(&str, Scalar); 3] = [
@@ -17,57 +22,111 @@ const COLUMNS: [(&str, Scalar); 3] = [
     ("significant", Scalar::U8),
 ];
 
-/// Measures what changed, and writes it with the new mesh to `output`, if there is one.
-///
-/// # Errors
-/// See [`change::change`]; [`Error::Parameter`] for an output that is not PLY, or one of the surfaces.
-pub fn change(
-    surfaces: [&Path; 2],
-    output: Option<&Path>,
-    options: &Options,
-    workspace: &Workspace,
-) -> Result<Change> {
-    let measured = |[old, new]: [&Path; 2]| {
-        let (found, changes) = change::change(old, new, options, workspace)?;
-        Ok((found, changes, ()))
-    };
-    mapped(surfaces, output, workspace, measured).map(|(found, ())| found)
+/// The version of what a resumed run reads.
+const FORMAT: &str = "change 1";
+
+/// The measurement of what changed between two surfaces. With a map it can be resumed.
+#[derive(Clone)]
+pub struct ChangeDetection {
+    /// The old surface and the new one.
+    surfaces: [PathBuf; 2],
+    output: Option<PathBuf>,
+    options: Options,
+    resources: Resources,
 }
 
-/// As [`change()`], with what [`crate::page::change`] shows.
-///
-/// # Errors
-/// See [`change()`].
-#[cfg(feature = "pages")]
-pub fn illustrated_change(
-    surfaces: [&Path; 2],
-    output: Option<&Path>,
-    options: &Options,
-    workspace: &Workspace,
-) -> Result<(Change, change::Illustration)> {
-    mapped(surfaces, output, workspace, |[old, new]| {
-        change::illustrated(old, new, options, workspace)
-    })
-}
+impl ChangeDetection {
+    /// Measures what changed from `old`, a mesh or a cloud, to the mesh `new`.
+    pub fn new(old: impl Into<PathBuf>, new: impl Into<PathBuf>, options: Options) -> Self {
+        Self {
+            surfaces: [old.into(), new.into()],
+            output: None,
+            options,
+            resources: Resources::default(),
+        }
+    }
 
-/// Measures, and writes the map.
-fn mapped<T>(
-    surfaces: [&Path; 2],
-    output: Option<&Path>,
-    workspace: &Workspace,
-    measured: impl FnOnce([&Path; 2]) -> Result<(Change, Changes, T)>,
-) -> Result<(Change, T)> {
-    if let Some(output) = output {
+    /// Writes the new mesh to a PLY file, with what changed as columns of its vertices.
+    #[must_use]
+    pub fn output(mut self, path: impl Into<PathBuf>) -> Self {
+        self.output = Some(path.into());
+        self
+    }
+
+    resource_setters!();
+
+    /// Measures what changed.
+    ///
+    /// # Errors
+    /// See [`change::change`]; [`Error::Parameter`] for an output that is not PLY, or one of the surfaces, and for an
+    /// unfinished run without an output; those of an unfinished run, as of [`crate::Reconstruction::run`].
+    pub fn run(&self) -> Result<Change> {
+        let measure = |[old, new]: [&Path; 2], workspace: &Workspace| {
+            let (found, changes) = change::change(old, new, &self.options, workspace)?;
+            Ok((found, changes, ()))
+        };
+        self.mapped(measure, |_, ()| Ok(()))
+    }
+
+    /// As [`ChangeDetection::run`]; `show` gets what [`crate::page::change`] puts into a page, before the run ends.
+    ///
+    /// # Errors
+    /// See [`ChangeDetection::run`]; errors of `show`.
+    #[cfg(feature = "pages")]
+    pub fn run_illustrated(
+        &self,
+        show: impl FnOnce(&Change, &change::Illustration) -> Result<()>,
+    ) -> Result<Change> {
+        let measure = |[old, new]: [&Path; 2], workspace: &Workspace| {
+            change::illustrated(old, new, &self.options, workspace)
+        };
+        self.mapped(measure, |found, drawn| show(found, &drawn))
+    }
+
+    /// Measures, writes the map, and shows what was found.
+    fn mapped<T>(
+        &self,
+        measure: impl FnOnce([&Path; 2], &Workspace) -> Result<(Change, Changes, T)>,
+        show: impl FnOnce(&Change, T) -> Result<()>,
+    ) -> Result<Change> {
+        let surfaces = [&*self.surfaces[0], &*self.surfaces[1]];
+        let Some(output) = &self.output else {
+            if self.resources.start != Start::New {
+                return Err(Error::Parameter {
+                    name: "output",
+                    found: "none".into(),
+                    expected: "a map: only a run that writes one can be resumed".into(),
+                });
+            }
+            let workspace = self.resources.workspace()?;
+            let (found, _, more) = measure(surfaces, &workspace)?;
+            show(&found, more)?;
+            return Ok(found);
+        };
         check_output(surfaces, output)?;
+        let job = MeshJob {
+            format: FORMAT,
+            inputs: &self.surfaces,
+            output,
+            options: &self.options,
+            resources: &self.resources,
+            delivery: None,
+        };
+        let make = |workspace: &Workspace| {
+            let (found, changes, more) = measure(surfaces, workspace)?;
+            let observer = &workspace.observer;
+            observer.begin("write", "triangles", found.new.triangles);
+            written(surfaces[1], output, &changes, workspace)?;
+            observer.end();
+            show(&found, more)?;
+            Ok(found)
+        };
+        // When all is done, the files of the steps inside may be gone.
+        job.run(
+            |workspace| workspace.once("change", |_| make(workspace)),
+            || (),
+        )
     }
-    let (found, changes, more) = measured(surfaces)?;
-    if let Some(output) = output {
-        let observer = &workspace.observer;
-        observer.begin("write", "triangles", found.new.triangles);
-        written(surfaces[1], output, &changes, workspace)?;
-        observer.end();
-    }
-    Ok((found, more))
 }
 
 /// Refuses an output that is no plain PLY, or a surface itself.

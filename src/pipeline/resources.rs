@@ -1,8 +1,10 @@
 //! Resources of runs of all kinds, and the methods that set them.
 
 use super::{Start, default_memory, default_threads};
-use outcrop_disk::workspace::Storage;
+use outcrop_disk::error::Result;
+use outcrop_disk::workspace::memory::MemoryPool;
 use outcrop_disk::workspace::progress::{Cancel, Observer, Silent};
+use outcrop_disk::workspace::{Storage, Workspace};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -41,6 +43,20 @@ impl Resources {
     /// The number of worker threads.
     pub fn threads(&self) -> usize {
         self.threads.unwrap_or_else(default_threads)
+    }
+
+    /// A workspace of a run that cannot be resumed.
+    ///
+    /// # Errors
+    /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Memory`].
+    pub fn workspace(&self) -> Result<Workspace> {
+        let memory = MemoryPool::new(self.memory())?;
+        let beside = std::env::temp_dir();
+        let scratch = self.scratch.as_deref().unwrap_or(&beside);
+        let (observer, cancel) = (self.observer.clone(), self.cancel.clone());
+        let workspace = Workspace::new(scratch, memory, self.threads(), observer, cancel)?;
+        workspace.set_storage(self.storage)?;
+        Ok(workspace)
     }
 }
 

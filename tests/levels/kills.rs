@@ -11,6 +11,8 @@ use std::process::{Command, Output};
 struct Case<'a> {
     folder: tempfile::TempDir,
     command: &'a str,
+    /// The name of an input that comes first, if there is one.
+    first: Option<&'a str>,
     options: &'a [&'a str],
 }
 
@@ -24,6 +26,7 @@ impl<'a> Case<'a> {
         Self {
             folder,
             command,
+            first: None,
             options,
         }
     }
@@ -34,7 +37,10 @@ impl<'a> Case<'a> {
 
     fn run(&self, output: &Path, fault: &str) -> Output {
         let mut command = Command::new(env!("CARGO_BIN_EXE_outcrop"));
-        command.arg(self.command).arg(self.at("input"));
+        command
+            .arg(self.command)
+            .args(self.first.map(|name| self.at(name)));
+        command.arg(self.at("input"));
         command.arg("-o").arg(output).args(self.options);
         command.args(["--quiet", "--resume", "--memory=192MiB", "--threads=2"]);
         if !fault.is_empty() {
@@ -70,7 +76,11 @@ fn clear(output: &Path) {
 
 /// Kills a run at `parts` events of each kind, and resumes it. `output` is the end of the name of what it writes.
 fn survives(command: &str, output: &str, options: &[&str], parts: u64) {
-    let case = Case::new(command, options);
+    goes_on(&Case::new(command, options), output, parts);
+}
+
+fn goes_on(case: &Case<'_>, output: &str, parts: u64) {
+    let (command, options) = (case.command, case.options);
     let [first, again] = ["first", "again"].map(|name| case.at(&format!("{name}{output}")));
     let events = case.at("events");
     case.whole(
@@ -101,7 +111,8 @@ fn survives(command: &str, output: &str, options: &[&str], parts: u64) {
     // Nothing is left beside.
     let left = std::fs::read_dir(case.folder.path()).unwrap();
     let left: Vec<_> = left.map(|entry| entry.unwrap().file_name()).collect();
-    assert_eq!(left.len(), 3, "{left:?}");
+    let inputs = 1 + usize::from(case.first.is_some());
+    assert_eq!(left.len(), 2 + inputs, "{left:?}");
 }
 
 const TILES: &[&str] = &["--most-triangles=300"];
@@ -135,6 +146,24 @@ fn a_mesh_is_simplified_and_closed_in_spite_of_kills() {
 #[test]
 fn a_mesh_is_closed_in_spite_of_kills() {
     survives("close", ".ply", &["--kind=base"], 3);
+}
+
+/// What changed since another surface, which `write` makes.
+fn change_survives(write: impl FnOnce(&Path), parts: u64) {
+    let mut case = Case::new("change", &["--radius=0.5"]);
+    case.first = Some("old");
+    write(&case.at("old"));
+    goes_on(&case, ".ply", parts);
+}
+
+#[test]
+fn what_changed_since_a_mesh_is_measured_in_spite_of_kills() {
+    change_survives(|old| hills(60, true).write(old), 4);
+}
+
+#[test]
+fn what_changed_since_a_cloud_is_measured_in_spite_of_kills() {
+    change_survives(cloud, 3);
 }
 
 #[test]

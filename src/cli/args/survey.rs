@@ -44,6 +44,8 @@ pub struct Change {
     pub html: Option<PathBuf>,
     #[command(flatten)]
     pub limits: Limits,
+    #[command(flatten)]
+    pub again: Again,
 }
 
 /// Which height a cell has.

@@ -1,14 +1,14 @@
-//! A table for the work of one function, which deletes it.
+//! A table for the work of one function, which deletes it unless a later attempt needs it.
 
 use super::Row;
 use super::table::{read_rows, stored_bytes};
 use crate::error::Result;
 use crate::workspace::file::ScratchFile;
-use crate::workspace::{Files, Workspace};
+use crate::workspace::{Files, Unit, Workspace};
 use std::marker::PhantomData;
 use std::sync::Arc;
 
-/// Numbered sections of rows in a scratch file that does not survive the attempt and is deleted on drop.
+/// Numbered sections of rows in a scratch file. It is deleted on drop, unless it survives the attempt.
 #[derive(Debug)]
 pub struct LocalTable<R: Row> {
     file: Arc<ScratchFile>,
@@ -28,6 +28,26 @@ impl<R: Row> LocalTable<R> {
             files,
             rows: PhantomData,
         })
+    }
+
+    /// Opens the scratch file `name`, which survives the attempt: with the sections that finished units of it, or of an
+    /// earlier attempt, have [put](LocalTable::put_by) into it.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Memory`].
+    pub fn kept(workspace: &Workspace, name: &str) -> Result<Self> {
+        let files = workspace.files.clone();
+        Ok(Self {
+            file: files.open(name, true)?,
+            files,
+            rows: PhantomData,
+        })
+    }
+
+    /// The name of the scratch file.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.file.name
     }
 
     /// Number of sections.
@@ -50,6 +70,16 @@ impl<R: Row> LocalTable<R> {
         let bytes = stored_bytes(&self.file, rows, |_| ());
         let place = self.file.append(self.files.worker(), &bytes, rows.len())?;
         self.file.set(section as u32, place)
+    }
+
+    /// As [`LocalTable::put`]; if the table survives the attempt, the section does once the unit is finished.
+    ///
+    /// # Errors
+    /// [`crate::error::Error::Io`], [`crate::error::Error::Disk`].
+    pub fn put_by(&self, unit: &Unit<'_>, section: usize, rows: &[R]) -> Result<()> {
+        let bytes = stored_bytes(&self.file, rows, |bytes| unit.hold(bytes));
+        let place = self.file.append(unit.worker(), &bytes, rows.len())?;
+        self.file.put(unit, section as u32, place)
     }
 
     /// Writes the next section.
@@ -82,7 +112,9 @@ impl<R: Row> LocalTable<R> {
 
 impl<R: Row> Drop for LocalTable<R> {
     fn drop(&mut self) {
-        // A file that cannot be deleted is deleted with its folder.
-        let _ = self.files.release(&self.file.name);
+        if !self.file.is_kept() {
+            // A file that cannot be deleted is deleted with its folder.
+            let _ = self.files.release(&self.file.name);
+        }
     }
 }

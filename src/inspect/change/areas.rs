@@ -36,7 +36,7 @@ pub struct Area {
 }
 
 /// Exact sums of rounded numbers: they do not depend on the order.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
 pub(super) struct Sums {
     vertices: u64,
     area: i128,
@@ -77,6 +77,14 @@ impl Sums {
             true => self.gained += part,
             false => self.lost -= part,
         }
+    }
+
+    /// Adds the sums of other vertices.
+    pub fn join(&mut self, more: &Self) {
+        self.vertices += more.vertices;
+        self.area += more.area;
+        self.gained += more.gained;
+        self.lost += more.lost;
     }
 
     pub fn vertices(&self) -> u64 {
@@ -180,18 +188,11 @@ impl Sink for Edges<'_> {
 }
 
 /// The areas of change, and the sums of those that are too small to be told.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct Areas {
+pub(super) struct Areas {
     /// The areas, the largest volume first.
     pub areas: Vec<Area>,
-    /// Changed vertices in areas of fewer than 30.
-    pub small_vertices: u64,
-    /// Their surface.
-    pub small_area: f64,
-    /// Their volumes.
-    pub small_gained: f64,
-    /// Likewise.
-    pub small_lost: f64,
+    /// The sums of the others.
+    pub small: Sums,
 }
 
 /// An area that is being measured.
@@ -316,10 +317,7 @@ pub(super) fn measured(
     drop(held);
     Ok(Areas {
         areas: areas.into_iter().map(|(_, area)| area).collect(),
-        small_vertices: small.vertices,
-        small_area: small.area(&units),
-        small_gained: small.gained(&units),
-        small_lost: small.lost(&units),
+        small,
     })
 }
 

@@ -96,6 +96,8 @@ impl Drawing {
 }
 
 impl Witness for Drawing {
+    const SEES: bool = true;
+
     fn take(&mut self, position: V3, row: &ChangeRow) {
         let change = f64::from(row.changes()[0]);
         let tone = match row.state() {

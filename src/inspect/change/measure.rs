@@ -2,12 +2,14 @@
 
 use super::gather::Gatherer;
 use super::patch::{Axis, Layer, Patch, Point, grown};
-use super::surface::{Points, Surface, Vertex, WAVE};
+use super::surface::{PIECE, Points, Surface, Vertex};
 use super::{ChangeRow, Scale, State};
+use crate::compare::pages::Pages;
 use outcrop_disk::error::Result;
-use outcrop_disk::workspace::{Workspace, lock};
+use outcrop_disk::workspace::{Unit, Workspace, lock};
 use outcrop_geom::vector::{Box3, V3};
-use rayon::prelude::*;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use std::sync::Mutex;
 use std::sync::atomic::AtomicU64;
 use std::sync::atomic::Ordering::Relaxed;
@@ -25,58 +27,94 @@ pub(super) struct Measure<'a> {
 }
 
 impl Measure<'_> {
-    /// Calls `each` with some vertices, which follow each other on the curve, and the results at them.
-    pub fn each(
+    /// Number of pieces of the surface.
+    pub fn pieces(&self) -> usize {
+        self.vertices().map_or(0, |vertices| {
+            vertices.total().div_ceil(PIECE as u64) as usize
+        })
+    }
+
+    fn vertices(&self) -> Option<&Pages<Vertex>> {
+        match &self.from.items {
+            Points::Mesh(vertices, _) => Some(vertices),
+            Points::Cloud(_) => None,
+        }
+    }
+
+    /// Reads the vertices of a piece into `piece`.
+    pub fn read(&self, number: usize, piece: &mut Vec<Vertex>) -> Result<()> {
+        piece.clear();
+        let Some(vertices) = self.vertices() else {
+            return Ok(());
+        };
+        let (page, mut some) = (vertices.page(), Vec::new());
+        let end = ((number + 1) * PIECE).min(vertices.total() as usize);
+        let mut next = number * PIECE;
+        while next < end {
+            vertices.get_into(next / page, &mut some)?;
+            let first = next % page;
+            let count = some.len().saturating_sub(first).min(end - next);
+            if count == 0 {
+                break;
+            }
+            piece.extend_from_slice(&some[first..first + count]);
+            next += count;
+        }
+        Ok(())
+    }
+
+    /// Measures all pieces in the step `step`, those of earlier attempts not again. `work` gets the vertices of a piece
+    /// and the results at them, `each` what it returns, in any order.
+    pub fn each<T: Serialize + DeserializeOwned + Send>(
         &self,
+        step: &'static str,
         workspace: &Workspace,
-        mut each: impl FnMut(&[Vertex], &[ChangeRow]) -> Result<()>,
+        work: impl Fn(&Unit<'_>, &[Vertex], &[ChangeRow]) -> Result<T> + Sync,
+        mut each: impl FnMut(T) + Send,
     ) -> Result<()> {
-        let Points::Mesh(vertices, _) = &self.from.items else {
+        let Some(vertices) = self.vertices() else {
             return Ok(());
         };
         let threads = workspace.threads as u64;
         let share = workspace.memory.available() / 8 / threads;
         let page = self.from.page_bytes() + self.to.page_bytes();
-        let pages = share.saturating_sub(PATCHES) / page;
-        let pages = pages.clamp(1, 1 << 14);
-        let wave = WAVE * (size_of::<Vertex>() + size_of::<ChangeRow>());
-        let bytes = threads * (pages * page + PATCHES) + wave as u64 + vertices.page_bytes();
-        let mut at_hand = workspace.reserve("change: surfaces at hand", bytes)?;
+        let pages = (share.saturating_sub(PATCHES) / page).clamp(1, 1 << 14);
+        let bytes = threads * (pages * page + PATCHES);
+        let at_hand = Mutex::new(workspace.reserve("change: surfaces at hand", bytes)?);
         let (workers, patches) = (Mutex::new(Vec::new()), AtomicU64::new(PATCHES));
-        let one = |group: &[Vertex]| {
+        let piece = PIECE * (size_of::<Vertex>() + size_of::<ChangeRow>());
+        let piece = piece as u64 + vertices.page_bytes();
+        let one = |unit: &Unit<'_>| {
             let worker = lock(&workers).pop();
             let mut worker = worker.unwrap_or_else(|| Worker::new(self, pages as usize));
-            let found = worker.group(group)?;
-            patches.fetch_max(worker.bytes(), Relaxed);
-            lock(&workers).push(worker);
-            Ok(found)
-        };
-        let mut measure = |wave: &mut Vec<Vertex>| {
-            workspace.check_cancel()?;
-            let groups = self.from.cells.groups(wave, Vertex::position);
-            let found: Vec<Vec<ChangeRow>> = workspace.install(|| {
-                let groups = groups.par_iter().with_max_len(1);
-                groups.map(|group| one(group)).collect::<Result<_>>()
-            })?;
-            let more = patches.load(Relaxed) - PATCHES;
-            at_hand.at_least(bytes + threads * more)?;
-            let mut all = groups.iter().zip(&found);
-            all.try_for_each(|(group, rows)| each(group, rows))?;
-            workspace.observer.advance(wave.len() as u64);
-            wave.clear();
-            Ok(())
-        };
-        let mut wave = Vec::with_capacity(WAVE);
-        vertices.for_each_page(|page| {
-            for vertex in page {
-                wave.push(*vertex);
-                if wave.len() == WAVE {
-                    measure(&mut wave)?;
-                }
+            let _held = unit.hold(piece);
+            let mut piece = Vec::with_capacity(PIECE);
+            self.read(unit.number(), &mut piece)?;
+            let mut rows = Vec::with_capacity(piece.len());
+            for group in self.from.cells.groups(&piece, Vertex::position) {
+                workspace.check_cancel()?;
+                worker.group(group, &mut rows)?;
             }
-            Ok(())
-        })?;
-        measure(&mut wave)
+            let before = patches.fetch_max(worker.bytes(), Relaxed);
+            if worker.bytes() > before {
+                let more = worker.bytes() - PATCHES;
+                lock(&at_hand).at_least(bytes + threads * more)?;
+            }
+            lock(&workers).push(worker);
+            unit.advance(piece.len() as u64);
+            work(unit, &piece, &rows)
+        };
+        let name = (step, "change: pieces");
+        workspace.units(
+            name,
+            self.pieces(),
+            |_| piece,
+            one,
+            |_, found| {
+                each(found);
+                Ok(())
+            },
+        )
     }
 }
 
@@ -109,7 +147,7 @@ impl<'a> Worker<'a> {
         patches.iter().map(|patch| patch.bytes()).sum()
     }
 
-    fn group(&mut self, group: &[Vertex]) -> Result<Vec<ChangeRow>> {
+    fn group(&mut self, group: &[Vertex], rows: &mut Vec<ChangeRow>) -> Result<()> {
         let radius = self.measure.scale.radius;
         let positions = group.iter().map(Vertex::position);
         let around = positions.fold(Box3::EMPTY, Box3::with);
@@ -119,13 +157,13 @@ impl<'a> Worker<'a> {
         // A layer up to a radius away, and what belongs to it a radius behind.
         self.to
             .gather(&grown(around, 2.25 * radius), radius, &mut self.other)?;
-        let row = |vertex: &Vertex| {
-            Ok(ChangeRow {
+        for vertex in group {
+            rows.push(ChangeRow {
                 index: vertex.number(),
                 ..self.vertex(&vertex.point())?
-            })
-        };
-        group.iter().map(row).collect()
+            });
+        }
+        Ok(())
     }
 
     /// Measures change, uncertainty, area and volume at a vertex.

@@ -26,25 +26,25 @@ mod surface;
 #[cfg(test)]
 mod tests;
 
-pub use areas::{Area, Areas};
+pub use areas::Area;
 #[cfg(feature = "pictures")]
 pub use drawing::Illustration;
 pub use report::Change;
 pub use rows::{ChangeRow, Changes, ROWS, State};
 
 use crate::compare::shape::Shape;
-use crate::compare::{self, Kind, Side, read_side};
-use areas::{Sums, Units};
+use crate::compare::{Kind, Side, read_side_once};
+use areas::{Areas, Sums, Units};
 use measure::Measure;
 use outcrop_codecs::ply_mesh::PlyMesh;
 use outcrop_disk::error::{Error, Result};
-use outcrop_disk::spill::Sorter;
-use outcrop_disk::workspace::Workspace;
+use outcrop_disk::spill::{Sorter, Table};
+use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_geom::vector::V3;
 use rows::sections;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
-use surface::{Points, Surface};
+use surface::{Points, Surface, Vertex};
 
 /// Mean distances of vertices in the radius of the cylinder, if it is not given: about 28 vertices of the sparser
 /// surface are in it. M3C2 wants 20 or more.
@@ -75,6 +75,8 @@ struct Scale {
 
 /// Sees what was found.
 trait Witness {
+    /// False if it looks at nothing.
+    const SEES: bool;
     /// Takes a vertex of the new surface.
     fn take(&mut self, position: V3, row: &ChangeRow);
     /// Takes a vertex of the old surface where the new one is not.
@@ -82,6 +84,7 @@ trait Witness {
 }
 
 impl Witness for () {
+    const SEES: bool = false;
     fn take(&mut self, _: V3, _: &ChangeRow) {}
     fn gone(&mut self, _: V3) {}
 }
@@ -126,16 +129,12 @@ fn seen<W: Witness>(
     workspace: &Workspace,
     begin: impl FnOnce(&Shape, &Shape) -> Result<W>,
 ) -> Result<(Change, Changes, W)> {
-    let sides = compare::Options {
-        samples: 0,
-        seed: 0,
-    };
     check(options)?;
-    let new = read_side(path, "change.new", &sides, workspace)?;
+    let new = read_side_once(path, "change.new", workspace)?;
     if new.side.kind == Kind::Cloud {
         return Err(Error::input(path, "new surface", "a cloud", "a mesh"));
     }
-    let old = read_side(old, "change.old", &sides, workspace)?;
+    let old = read_side_once(old, "change.old", workspace)?;
     let scale = lengths(options, &old.side, &new.side);
     let mut witness = begin(&new, &old)?;
     let units = Units::of(&old.side.bounds().union(new.side.bounds()));
@@ -168,6 +167,7 @@ fn told(
     areas: Areas,
 ) -> Change {
     let [same, changed, alone, _] = sums;
+    let Areas { areas, small } = areas;
     Change {
         old,
         new,
@@ -183,55 +183,93 @@ fn told(
         gained: changed.gained(units) + alone.gained(units),
         lost: changed.lost(units) + alone.lost(units),
         areas,
+        small_vertices: small.vertices(),
+        small_area: small.area(units),
+        small_gained: small.gained(units),
+        small_lost: small.lost(units),
     }
 }
 
 /// Measures the change at all vertices; returns sums by [`State`], and the rows in order.
-fn measured(
+fn measured<W: Witness>(
     measure: &Measure<'_>,
     units: &Units,
-    witness: &mut impl Witness,
+    witness: &mut W,
     workspace: &Workspace,
 ) -> Result<([Sums; 4], Changes)> {
     let path = &measure.from.shape.side.path;
     let vertices = PlyMesh::open_any(path, workspace)?.vertices();
     let observer = &workspace.observer;
     observer.begin("change", "vertices", vertices);
+    let found = Table::<ChangeRow>::new("change.measured", measure.pieces());
+    let mut sums = [Sums::default(); 4];
+    let put = |unit: &Unit<'_>, _: &[Vertex], rows: &[ChangeRow]| {
+        let mut sums = [Sums::default(); 4];
+        for row in rows {
+            sums[row.state() as usize].add(row, units);
+        }
+        found.put(unit, unit.number(), rows)?;
+        Ok(sums)
+    };
+    measure.each("measure", workspace, put, |some| {
+        let both = sums.iter_mut().zip(some);
+        both.for_each(|(all, some)| all.join(&some));
+    })?;
     let bytes = vertices * size_of::<ChangeRow>() as u64;
     let buffer = bytes.min(workspace.memory.available() / 12) + (1 << 20);
     let _held = workspace.reserve("change: sort buffers", buffer + buffer / 2)?;
     let sorter = Sorter::new(workspace, "change.rows", buffer);
-    let mut sums = [Sums::default(); 4];
-    measure.each(workspace, |vertices, rows| {
-        for (vertex, row) in vertices.iter().zip(rows) {
-            sums[row.state() as usize].add(row, units);
-            witness.take(vertex.position(), row);
+    let (unit, mut rows, mut piece) = (workspace.unit(), Vec::new(), Vec::new());
+    for number in 0..measure.pieces() {
+        workspace.check_cancel()?;
+        found.get_into(&unit, number, &mut rows)?;
+        if W::SEES {
+            measure.read(number, &mut piece)?;
+            let both = piece.iter().zip(&rows);
+            both.for_each(|(vertex, row)| witness.take(vertex.position(), row));
         }
-        sorter.push(rows)
-    })?;
+        sorter.push(&rows)?;
+    }
+    if !workspace.is_resumable() {
+        found.release(workspace)?;
+    }
     observer.end();
     Ok((sums, sections(sorter, vertices, workspace)?))
 }
 
 /// The area of a surface where the other one is not.
-fn area_alone(
+fn area_alone<W: Witness>(
     measure: &Measure<'_>,
     units: &Units,
-    witness: &mut impl Witness,
+    witness: &mut W,
     workspace: &Workspace,
 ) -> Result<f64> {
     let mut alone = Sums::default();
     let observer = &workspace.observer;
     let vertices = measure.from.shape.side.points;
     observer.begin("what only the old one has", "vertices", vertices);
-    measure.each(workspace, |vertices, rows| {
+    let places = Table::<V3>::new("change.alone", measure.pieces());
+    let find = |unit: &Unit<'_>, vertices: &[Vertex], rows: &[ChangeRow]| {
+        let (mut sums, mut some) = (Sums::default(), Vec::new());
         let both = vertices.iter().zip(rows);
         for (vertex, row) in both.filter(|(_, row)| row.state() == State::Alone) {
-            alone.add(row, units);
-            witness.gone(vertex.position());
+            sums.add(row, units);
+            some.push(vertex.position());
         }
-        Ok(())
+        places.put(unit, unit.number(), &some)?;
+        Ok(sums)
+    };
+    measure.each("find what only the old one has", workspace, find, |some| {
+        alone.join(&some)
     })?;
+    let (unit, mut some) = (workspace.unit(), Vec::new());
+    for number in (0..measure.pieces()).filter(|_| W::SEES) {
+        places.get_into(&unit, number, &mut some)?;
+        some.iter().for_each(|place| witness.gone(*place));
+    }
+    if !workspace.is_resumable() {
+        places.release(workspace)?;
+    }
     observer.end();
     Ok(alone.area(units))
 }

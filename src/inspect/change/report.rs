@@ -1,6 +1,6 @@
 //! The sums over all vertices and areas, and their text.
 
-use super::areas::Areas;
+use super::areas::Area;
 use crate::compare::Side;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -34,9 +34,16 @@ pub struct Change {
     pub gained: f64,
     /// Volume lost there.
     pub lost: f64,
-    /// Connected areas of change.
-    #[serde(flatten)]
-    pub areas: Areas,
+    /// Connected areas of change, the largest volume first.
+    pub areas: Vec<Area>,
+    /// Changed vertices in areas of fewer than 30, which are no areas of their own.
+    pub small_vertices: u64,
+    /// Their surface.
+    pub small_area: f64,
+    /// The volume gained there.
+    pub small_gained: f64,
+    /// The volume lost there.
+    pub small_lost: f64,
 }
 
 impl fmt::Display for Change {
@@ -70,17 +77,13 @@ impl fmt::Display for Change {
             "volume       gained {:.4}, lost {:.4}",
             self.gained, self.lost
         )?;
-        let Areas {
-            areas,
-            small_vertices,
-            ..
-        } = &self.areas;
         write!(
             f,
-            "areas        {}, and {small_vertices} vertices in smaller ones",
-            areas.len()
+            "areas        {}, and {} vertices in smaller ones",
+            self.areas.len(),
+            self.small_vertices
         )?;
-        for area in areas.iter().take(10) {
+        for area in self.areas.iter().take(10) {
             let [x, y, z] = area.largest_at;
             let largest = area
                 .largest

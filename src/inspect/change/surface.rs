@@ -7,14 +7,17 @@ use outcrop_codecs::ply_mesh::{PlyMesh, Sink};
 use outcrop_disk::error::Result;
 use outcrop_disk::spill::{Sorter, row};
 use outcrop_disk::workspace::memory::Reservation;
-use outcrop_disk::workspace::{Workspace, lock};
+use outcrop_disk::workspace::{Unit, Workspace, lock};
 use outcrop_geom::vector::{Box3, V3, add, cross, dot, scale, sub};
 use rayon::prelude::*;
 use rustc_hash::FxHashMap;
 use std::sync::Mutex;
 
-/// Vertices in memory at a time.
-pub(super) const WAVE: usize = 1 << 16;
+/// Vertices of a piece of the curve, which one thread measures.
+pub(super) const PIECE: usize = 1 << 14;
+
+/// Vertices in memory at a time while they are made.
+const WAVE: usize = 1 << 16;
 
 /// Most vertices of a group.
 const TOGETHER: usize = 2048;
@@ -190,7 +193,10 @@ impl<'a> Surface<'a> {
         let items = match &shape.items {
             Items::Cloud(points) => Points::Cloud(points),
             Items::Mesh { triangles, .. } => {
-                let points = summed(shape, triangles, &cells, workspace)?;
+                let name = format!("{}.points", shape.name);
+                let points = Pages::once(workspace, &name, |unit| {
+                    summed(shape, (triangles, &cells), &name, unit)
+                })?;
                 Points::Mesh(Box::new(points), triangles)
             }
         };
@@ -213,13 +219,14 @@ impl<'a> Surface<'a> {
 /// The vertices of a mesh with their shares of the triangles, as pages.
 fn summed(
     shape: &Shape,
-    triangles: &Pages<[V3; 3]>,
-    cells: &Cells,
-    workspace: &Workspace,
+    (triangles, cells): (&Pages<[V3; 3]>, &Cells),
+    name: &str,
+    unit: &Unit<'_>,
 ) -> Result<Pages<Vertex>> {
+    let workspace: &Workspace = unit;
     let (sorter, held) = vertices(shape, workspace)?;
     let count = PlyMesh::open_any(&shape.side.path, workspace)?.vertices();
-    let mut writer = PageWriter::new(workspace, &format!("{}.points", shape.name), count)?;
+    let mut writer = PageWriter::new(workspace, name, count, Some(unit))?;
     let threads = workspace.threads as u64;
     let share = workspace.memory.available() / 8 / threads;
     let pages = (share / triangles.page_bytes()).clamp(1, 1 << 14);

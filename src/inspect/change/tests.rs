@@ -74,7 +74,7 @@ fn a_pit_and_a_heap_have_their_volumes() {
         "{} {heap}",
         found.gained
     );
-    let areas = &found.areas.areas;
+    let areas = &found.areas;
     assert_eq!(areas.len(), 2, "{areas:?}");
     let largest = |k: usize| areas[k].largest.unwrap();
     assert!((largest(0) + 2.0).abs() < 0.1, "{areas:?}");
@@ -175,7 +175,7 @@ fn a_new_house_is_its_volume() {
     );
     assert!(found.lost < 1.0, "{}", found.lost);
     // The walls of the other house lie a part of a step elsewhere, which is significant without noise.
-    let house = found.areas.areas[0];
+    let house = found.areas[0];
     assert!(
         (house.gained / found.gained - 1.0).abs() < 0.01,
         "{house:?}"

@@ -3,7 +3,7 @@
 use super::pages::PageWriter;
 use super::shape::{Items, Kind, Shape, side, unusable, usable};
 use outcrop_disk::error::{Error, Result};
-use outcrop_disk::workspace::Workspace;
+use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_points::ingest;
 use outcrop_stages::order::order;
 use std::path::Path;
@@ -11,8 +11,13 @@ use std::path::Path;
 /// Points per page of the store between ingest and the pages.
 const STORE_PAGE: usize = 1 << 12;
 
-/// Reads a cloud in any format of ingest; duplicates become one point.
-pub(super) fn read(path: &Path, name: &'static str, workspace: &Workspace) -> Result<Shape> {
+/// Reads a cloud in any format of ingest; duplicates become one point. If there is a unit, the pages survive the attempt.
+pub(super) fn read(
+    path: &Path,
+    name: &'static str,
+    unit: Option<&Unit<'_>>,
+    workspace: &Workspace,
+) -> Result<Shape> {
     let observer = &workspace.observer;
     observer.begin("read cloud", "points", 0);
     let spool = ingest(&[path.to_path_buf()], workspace)?;
@@ -37,7 +42,7 @@ pub(super) fn read(path: &Path, name: &'static str, workspace: &Workspace) -> Re
     let store = stored.open(workspace)?;
 
     let count = store.len() as u64;
-    let mut writer = PageWriter::new(workspace, name, count)?;
+    let mut writer = PageWriter::new(workspace, name, count, unit)?;
     let _held = workspace.reserve("compare: points at hand", STORE_PAGE as u64 * 12)?;
     let mut points = Vec::new();
     for page in 0..store.pages() {
@@ -52,7 +57,10 @@ pub(super) fn read(path: &Path, name: &'static str, workspace: &Workspace) -> Re
             writer.push(position)?;
         }
     }
-    stored.release(workspace)?;
+    if unit.is_none() {
+        // A unit that is killed before its end needs them again.
+        stored.release(workspace)?;
+    }
     let pages = writer.finish()?;
     let mut side = side(path, Kind::Cloud, pages.bounds());
     side.points = count;

@@ -11,42 +11,38 @@ use super::triangles::{KeyedTriangle, Reading};
 use outcrop_codecs::ply_mesh::{PlyMesh, Sink};
 use outcrop_disk::error::Result;
 use outcrop_disk::spill::Sorter;
-use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::memory::Reservation;
+use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_geom::vector::{Box3, V3};
 use std::path::Path;
 
 /// Bytes of a vertex in memory, with a bit for its use.
 const VERTEX: u64 = 25;
 
-/// Reads a mesh.
+/// Reads a mesh. If there is a unit, the pages survive the attempt.
 pub(super) fn read(
-    mesh: PlyMesh,
     path: &Path,
     name: &'static str,
     options: &Options,
+    unit: Option<&Unit<'_>>,
     workspace: &Workspace,
 ) -> Result<Shape> {
-    read_with(mesh, path, name, options, None, workspace)
-}
-
-fn read_with(
-    mesh: PlyMesh,
-    path: &Path,
-    name: &'static str,
-    options: &Options,
-    sound: Option<Sound>,
-    workspace: &Workspace,
-) -> Result<Shape> {
+    let mesh = PlyMesh::open_any(path, workspace)?;
     let reading = Reading {
         path,
         name,
         options,
         workspace,
+        unit,
         vertices: mesh.vertices(),
         faces: mesh.faces(),
         bounds: Box3::EMPTY,
     };
+    read_with(mesh, reading, None)
+}
+
+fn read_with(mesh: PlyMesh, reading: Reading<'_>, sound: Option<Sound>) -> Result<Shape> {
+    let workspace = reading.workspace;
     let observer = &workspace.observer;
     let bytes = reading.vertices * VERTEX;
     let small = bytes <= workspace.memory.available() / 4;
@@ -70,12 +66,12 @@ fn read_with(
 /// exist or are not finite.
 #[cfg(feature = "pictures")]
 pub(super) fn read_sound(
-    mesh: PlyMesh,
     path: &Path,
     name: &'static str,
     options: &Options,
     workspace: &Workspace,
 ) -> Result<Shape> {
+    let mesh = PlyMesh::open_any(path, workspace)?;
     let vertices = mesh.vertices();
     let _held = workspace.reserve("draw: vertices", vertices.div_ceil(64) * 8)?;
     let sound = Sound {
@@ -84,7 +80,17 @@ pub(super) fn read_sound(
         seen: 0,
         batch: Vec::new(),
     };
-    read_with(mesh, path, name, options, Some(sound), workspace)
+    let reading = Reading {
+        path,
+        name,
+        options,
+        workspace,
+        unit: None,
+        vertices,
+        faces: mesh.faces(),
+        bounds: Box3::EMPTY,
+    };
+    read_with(mesh, reading, Some(sound))
 }
 
 /// Leaves out faces that cannot be drawn.

@@ -40,9 +40,9 @@ use drawing::Drawing;
 #[cfg(feature = "pictures")]
 pub(crate) use drawing::Sketch;
 use figures::Sums;
-use outcrop_codecs::ply_mesh::{PlyMesh, holds_faces};
+use outcrop_codecs::ply_mesh::holds_faces;
 use outcrop_disk::error::{Error, Result};
-use outcrop_disk::workspace::Workspace;
+use outcrop_disk::workspace::{Unit, Workspace};
 #[cfg(feature = "pictures")]
 use outcrop_draw::picture::Picture;
 use samples::Numbers;
@@ -74,17 +74,42 @@ pub(crate) fn read_side(
     options: &Options,
     workspace: &Workspace,
 ) -> Result<Shape> {
+    read_by(path, name, options, None, workspace)
+}
+
+/// If there is a unit, the pages survive the attempt once it is finished.
+fn read_by(
+    path: &Path,
+    name: &'static str,
+    options: &Options,
+    unit: Option<&Unit<'_>>,
+    workspace: &Workspace,
+) -> Result<Shape> {
     if path.is_file() && holds_faces(path)? {
-        mesh::read(
-            PlyMesh::open_any(path, workspace)?,
-            path,
-            name,
-            options,
-            workspace,
-        )
+        mesh::read(path, name, options, unit, workspace)
     } else {
-        cloud::read(path, name, workspace)
+        cloud::read(path, name, unit, workspace)
     }
+}
+
+/// As [`read_side`], without samples; what an earlier attempt read is not read again.
+pub(crate) fn read_side_once(
+    path: &Path,
+    name: &'static str,
+    workspace: &Workspace,
+) -> Result<Shape> {
+    let options = Options {
+        samples: 0,
+        seed: 0,
+    };
+    let mut made = None;
+    let kept = workspace.once(name, |unit| {
+        let shape = read_by(path, name, &options, Some(unit), workspace)?;
+        let kept = shape.kept();
+        made = Some(shape);
+        Ok(kept)
+    })?;
+    made.map_or_else(|| kept.open(path, name, workspace), Ok)
 }
 
 /// Distances between two shapes, each a mesh (PLY with faces) or a cloud (in any format of ingest).
@@ -135,8 +160,7 @@ pub(crate) fn marked(
         samples: 0,
         seed: 0,
     };
-    let mesh = PlyMesh::open_any(path, workspace)?;
-    let shape = mesh::read_sound(mesh, path, "verify.picture", &options, workspace)?;
+    let shape = mesh::read_sound(path, "verify.picture", &options, workspace)?;
     let sketch = Sketch::of(&shape, workspace)?;
     marks.iter().for_each(|mark| sketch.mark(*mark));
     sketch.pictures("Mesh", (0.0, 0.0), workspace)
@@ -215,7 +239,7 @@ pub fn distances(
     workspace: &Workspace,
     mut each: impl FnMut(Measured) -> Result<()>,
 ) -> Result<u64> {
-    let cloud = cloud::read(cloud, "compare.a", workspace)?;
+    let cloud = cloud::read(cloud, "compare.a", None, workspace)?;
     let options = |samples| Options { samples, seed: 0 };
     let to = read_side(to, "compare.b", &options(0), workspace)?;
     let mut index = 0;

@@ -4,8 +4,13 @@
 //! The size of a page depends only on the number of items. For more items pages grow, and not their number,
 //! so the tree stays small.
 
+mod writer;
+
+pub(crate) use writer::{KeptPages, PageWriter};
+
 use outcrop_disk::error::Result;
 use outcrop_disk::spill::{LocalTable, Row};
+#[cfg(feature = "pictures")]
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::memory::Reservation;
 use outcrop_geom::boxes::BoxTree;
@@ -13,12 +18,6 @@ use outcrop_geom::distance;
 use outcrop_geom::vector::{Box3, V3, dot, sub};
 use rustc_hash::FxHashMap;
 use std::cell::Cell;
-
-/// Least number of items per page.
-const LEAST: u64 = 64;
-
-/// Largest number of pages.
-const MOST_PAGES: u64 = 1 << 17;
 
 /// Pages that one thread takes at a time.
 #[cfg(feature = "pictures")]
@@ -94,6 +93,21 @@ impl<T: Item> Pages<T> {
     /// The box around all items.
     pub(crate) fn bounds(&self) -> Box3 {
         self.bounds
+    }
+
+    /// Number of items.
+    pub(crate) fn total(&self) -> u64 {
+        self.stored.total()
+    }
+
+    /// Reads the items of a page into `items`, which is cleared first.
+    pub(crate) fn get_into(&self, page: usize, items: &mut Vec<T>) -> Result<()> {
+        self.stored.get_into(page, items)
+    }
+
+    /// Items of a page, but the last.
+    pub(crate) fn page(&self) -> usize {
+        self.page
     }
 
     /// Number of pages.
@@ -347,64 +361,5 @@ impl<T> Cache<T> {
             std::collections::hash_map::Entry::Occupied(found) => Ok(found.into_mut()),
             std::collections::hash_map::Entry::Vacant(empty) => Ok(empty.insert(pages.load(page)?)),
         }
-    }
-}
-
-/// Writes [`Pages`] in order.
-#[derive(Debug)]
-pub(crate) struct PageWriter<T: Row> {
-    stored: LocalTable<T>,
-    page: usize,
-    pending: Vec<T>,
-    boxes: Vec<Box3>,
-    held: Reservation,
-}
-
-impl<T: Item> PageWriter<T> {
-    /// Starts the scratch file `name` for `count` items.
-    pub(crate) fn new(workspace: &Workspace, name: &str, count: u64) -> Result<Self> {
-        let page = count.div_ceil(MOST_PAGES).max(LEAST) as usize;
-        let pages = count.div_ceil(page as u64);
-        // The boxes are dropped before the tree grows to its size.
-        let index = pages * BoxTree::<f64>::BYTES + (page * 2 * size_of::<T>()) as u64;
-        Ok(Self {
-            held: workspace.reserve("compare: boxes", index + 4096)?,
-            stored: LocalTable::create(workspace, name)?,
-            page,
-            pending: Vec::with_capacity(page),
-            boxes: Vec::with_capacity(pages as usize),
-        })
-    }
-
-    pub(crate) fn push(&mut self, item: T) -> Result<()> {
-        self.pending.push(item);
-        if self.pending.len() == self.page {
-            self.flush()?;
-        }
-        Ok(())
-    }
-
-    fn flush(&mut self) -> Result<()> {
-        let bounds = self.pending.iter().map(T::bounds);
-        let bounds = bounds.fold(Box3::EMPTY, Box3::union);
-        self.stored.put(self.boxes.len(), &self.pending)?;
-        self.boxes.push(bounds);
-        self.pending.clear();
-        Ok(())
-    }
-
-    pub(crate) fn finish(mut self) -> Result<Pages<T>> {
-        if !self.pending.is_empty() {
-            self.flush()?;
-        }
-        let bounds = self.boxes.iter().copied().fold(Box3::EMPTY, Box3::union);
-        let boxes = self.boxes.into_iter().map(|Box3 { min, max }| [min, max]);
-        Ok(Pages {
-            stored: self.stored,
-            tree: BoxTree::of(boxes),
-            bounds,
-            page: self.page,
-            _held: self.held,
-        })
     }
 }

@@ -1,8 +1,9 @@
 //! One side of a comparison, as pages.
 
-use super::pages::Pages;
-use outcrop_disk::error::Error;
+use super::pages::{KeptPages, Pages};
+use outcrop_disk::error::{Error, Result};
 use outcrop_disk::spill::LocalTable;
+use outcrop_disk::workspace::Workspace;
 use outcrop_geom::vector::{Box3, V3};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -67,6 +68,58 @@ pub(crate) enum Items {
         vertices: LocalTable<V3>,
     },
     Cloud(Pages<V3>),
+}
+
+/// One side as an attempt leaves it to a later one: without the choice of vertices.
+#[derive(Debug, Serialize, Deserialize)]
+pub(crate) struct KeptShape {
+    /// Without its path, which the later attempt knows.
+    side: Side,
+    items: KeptItems,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+enum KeptItems {
+    Mesh(KeptPages<[V3; 3]>),
+    Cloud(KeptPages<V3>),
+}
+
+impl Shape {
+    pub(super) fn kept(&self) -> KeptShape {
+        let path = PathBuf::new();
+        KeptShape {
+            side: Side {
+                path,
+                ..self.side.clone()
+            },
+            items: match &self.items {
+                Items::Mesh { triangles, .. } => KeptItems::Mesh(triangles.kept()),
+                Items::Cloud(points) => KeptItems::Cloud(points.kept()),
+            },
+        }
+    }
+}
+
+impl KeptShape {
+    pub(super) fn open(
+        self,
+        path: &Path,
+        name: &'static str,
+        workspace: &Workspace,
+    ) -> Result<Shape> {
+        let path = path.to_path_buf();
+        Ok(Shape {
+            name,
+            side: Side { path, ..self.side },
+            items: match self.items {
+                KeptItems::Mesh(triangles) => Items::Mesh {
+                    triangles: triangles.open(workspace)?,
+                    vertices: LocalTable::create(workspace, &format!("{name}.vertices"))?,
+                },
+                KeptItems::Cloud(points) => Items::Cloud(points.open(workspace)?),
+            },
+        })
+    }
 }
 
 /// The description of a side with these numbers.

@@ -50,7 +50,7 @@ fn check(triangle: &[V3; 3], p: V3) {
 /// other as samples do.
 fn check_nearest<T: Item + std::fmt::Debug>(items: &[T], from: &[V3]) {
     let workspace = Workspace::for_tests(1).expect("a scratch folder");
-    let mut writer = PageWriter::new(&workspace, "items", items.len() as u64).unwrap();
+    let mut writer = PageWriter::new(&workspace, "items", items.len() as u64, None).unwrap();
     items.iter().for_each(|item| writer.push(*item).unwrap());
     let pages = writer.finish().unwrap();
     let found = pages.distances2(from, &mut Searcher::new(3)).unwrap();

@@ -7,8 +7,8 @@ use super::shape::{Items, Kind, Shape, side, unusable, usable};
 use oorandom::Rand64;
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::spill::{LocalTable, Row, Sorter, row};
-use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::memory::Reservation;
+use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_geom::vector::{Box3, V3, add, cross, dot, scale, sub};
 use std::path::Path;
 
@@ -49,6 +49,8 @@ pub(super) struct Reading<'a> {
     pub(super) name: &'static str,
     pub(super) options: &'a Options,
     pub(super) workspace: &'a Workspace,
+    /// See [`PageWriter::new`].
+    pub(super) unit: Option<&'a Unit<'a>>,
     /// Number of vertices in the header.
     pub(super) vertices: u64,
     /// Number of faces in the header.
@@ -108,7 +110,7 @@ impl Reading<'_> {
     pub(super) fn pages(&self, sorter: Sorter<KeyedTriangle>) -> Result<(Pages<[V3; 3]>, f64)> {
         let (observer, workspace) = (&self.workspace.observer, self.workspace);
         observer.begin("order", "triangles", self.faces);
-        let mut writer = PageWriter::new(workspace, self.name, self.faces)?;
+        let mut writer = PageWriter::new(workspace, self.name, self.faces, self.unit)?;
         let mut all = 0.0;
         let mut ticks = 0u64;
         sorter.finish(workspace)?.for_each(|keyed| {
