@@ -152,9 +152,11 @@ fn seen<W: Witness>(
         Points::Cloud(_) => None,
     };
     drop((from, to));
+    // The lists of areas need the memory of the pages.
+    let sides = [old, new].map(Shape::into_side);
     let vertices = rows.total();
     let areas = areas::measured(path, &rows, units, vertices, workspace)?;
-    let found = told([old.side, new.side], scale, (sums, &units), alone, areas);
+    let found = told(sides, scale, (sums, &units), alone, areas);
     Ok((found, rows, witness))
 }
 

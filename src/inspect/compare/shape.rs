@@ -85,6 +85,11 @@ enum KeptItems {
 }
 
 impl Shape {
+    /// Its description, without the pages.
+    pub(crate) fn into_side(self) -> Side {
+        self.side
+    }
+
     pub(super) fn kept(&self) -> KeptShape {
         let path = PathBuf::new();
         KeptShape {
