@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Fewer vertices are no area of their own: about as many as a cylinder holds.
-const LEAST: u32 = 30;
+const LEAST: u8 = 30;
 
 /// A connected area of change.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -270,15 +270,16 @@ pub(super) fn measured(
 ) -> Result<Areas> {
     let mut joined = Joined::of(path, rows, vertices, workspace)?;
     let mut held = workspace.reserve("change: list of areas", 0)?;
-    // The number of vertices of each area, at its first one; then only the large ones are kept.
-    let counted = workspace.reserve("change: sizes of areas", vertices * 4)?;
-    let mut sizes = vec![0u32; vertices as usize];
+    // The number of vertices of each area, as far as it tells which are large, at its first one; then only those are kept.
+    let counted = workspace.reserve("change: sizes of areas", vertices)?;
+    let mut sizes = vec![0u8; vertices as usize];
     for vertex in 0..vertices as u32 {
         if joined.ways[vertex as usize] != 0 {
-            sizes[joined.first(vertex) as usize] += 1;
+            let size = &mut sizes[joined.first(vertex) as usize];
+            *size = size.saturating_add(1);
         }
     }
-    let large = |(first, size): (u32, &u32)| (*size >= LEAST).then_some(first);
+    let large = |(first, size): (u32, &u8)| (*size >= LEAST).then_some(first);
     let number = sizes.iter().filter(|size| **size >= LEAST).count();
     held.at_least(2 * (number * (size_of::<Open>() + 8 + size_of::<Area>())) as u64)?;
     let empty = |first| {
