@@ -42,6 +42,7 @@ use outcrop_disk::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
 use outcrop_disk::workspace::progress::{Cancel, Observer};
 use outcrop_disk::workspace::{Folder, Storage, Workspace, limits};
 pub use raster::Rasterization;
+pub(crate) use resources::temporary;
 pub use shared::{
     Advanced, Begun, Status, TaskState, Totals, Worked, part_of, shared_folder, status,
 };

@@ -12,6 +12,7 @@ use crate::info;
 use crate::params::Params;
 use crate::pipeline::{
     Builder, ChangeDetection, Rasterization, Reconstruction, default_memory, default_threads,
+    temporary,
 };
 #[cfg(feature = "levels")]
 use crate::pipeline::{Closing, Simplification, Tiles};
@@ -41,13 +42,9 @@ pub fn memory(limits: &Limits) -> u64 {
     limits.memory.unwrap_or_else(default_memory)
 }
 
-fn workspace(limits: &Limits, (observer, cancel): Watch) -> Result<Workspace> {
-    let memory = MemoryPool::new(memory(limits))?;
-    let beside = std::env::temp_dir();
-    let scratch = limits.scratch.as_deref().unwrap_or(&beside);
-    let workspace = Workspace::new(scratch, memory, threads(limits), observer, cancel)?;
-    workspace.set_storage(limits.storing.storage())?;
-    Ok(workspace)
+fn workspace(limits: &Limits, watch: Watch) -> Result<Workspace> {
+    let places = (limits.scratch.as_deref(), limits.storing.storage());
+    temporary(places, (memory(limits), threads(limits)), watch)
 }
 
 /// Makes a mesh; `begins` is called when all checks are done.

@@ -1,4 +1,4 @@
-//! What changed from one surface to another, as columns of the new mesh.
+//! A measurement of change: the new mesh with the distance from the old surface as columns of its vertices.
 
 use super::Start;
 use super::like::{Like, is_one_of};

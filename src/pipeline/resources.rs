@@ -5,7 +5,7 @@ use outcrop_disk::error::Result;
 use outcrop_disk::workspace::memory::MemoryPool;
 use outcrop_disk::workspace::progress::{Cancel, Observer, Silent};
 use outcrop_disk::workspace::{Storage, Workspace};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Resources of a run; all have defaults.
@@ -50,14 +50,33 @@ impl Resources {
     /// # Errors
     /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Memory`].
     pub fn workspace(&self) -> Result<Workspace> {
-        let memory = MemoryPool::new(self.memory())?;
-        let beside = std::env::temp_dir();
-        let scratch = self.scratch.as_deref().unwrap_or(&beside);
-        let (observer, cancel) = (self.observer.clone(), self.cancel.clone());
-        let workspace = Workspace::new(scratch, memory, self.threads(), observer, cancel)?;
-        workspace.set_storage(self.storage)?;
-        Ok(workspace)
+        let places = (self.scratch.as_deref(), self.storage);
+        let sizes = (self.memory(), self.threads());
+        temporary(places, sizes, (self.observer.clone(), self.cancel.clone()))
     }
+}
+
+/// A workspace of a run that cannot be resumed: in a scratch folder, by default the system's for temporary files, with
+/// bytes of memory and threads.
+///
+/// # Errors
+/// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Memory`].
+pub(crate) fn temporary(
+    (scratch, storage): (Option<&Path>, Storage),
+    (memory, threads): (u64, usize),
+    (observer, cancel): (Arc<dyn Observer>, Cancel),
+) -> Result<Workspace> {
+    let memory = MemoryPool::new(memory)?;
+    let beside = std::env::temp_dir();
+    let workspace = Workspace::new(
+        scratch.unwrap_or(&beside),
+        memory,
+        threads,
+        observer,
+        cancel,
+    )?;
+    workspace.set_storage(storage)?;
+    Ok(workspace)
 }
 
 /// The methods of a builder with the field `resources`.

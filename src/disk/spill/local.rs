@@ -30,15 +30,15 @@ impl<R: Row> LocalTable<R> {
         })
     }
 
-    /// Opens the scratch file `name`, which survives the attempt: with the sections that finished units of it, or of an
-    /// earlier attempt, have [put](LocalTable::put_by) into it.
+    /// Opens the scratch file `name`, with the sections that finished units of an earlier attempt have
+    /// [put](LocalTable::put_by) into it. It survives the attempt if the run can be resumed.
     ///
     /// # Errors
     /// [`crate::error::Error::Memory`].
     pub fn kept(workspace: &Workspace, name: &str) -> Result<Self> {
         let files = workspace.files.clone();
         Ok(Self {
-            file: files.open(name, true)?,
+            file: files.open(name, workspace.is_resumable())?,
             files,
             rows: PhantomData,
         })

@@ -103,6 +103,26 @@ impl Workspace {
         Ok(value)
     }
 
+    /// As [`Workspace::once`], for a value that cannot be saved, such as one with open files. `make` returns it with
+    /// what is saved of it, from which `open` makes it again in a later attempt.
+    ///
+    /// # Errors
+    /// Errors of [`Workspace::once`] and of `open`.
+    pub fn once_opened<T, S: Serialize + DeserializeOwned>(
+        &self,
+        name: &str,
+        make: impl FnOnce(&Unit<'_>) -> Result<(T, S)>,
+        open: impl FnOnce(S) -> Result<T>,
+    ) -> Result<T> {
+        let mut made = None;
+        let saved = self.once(name, |unit| {
+            let (value, saved) = make(unit)?;
+            made = Some(value);
+            Ok(saved)
+        })?;
+        made.map_or_else(|| open(saved), Ok)
+    }
+
     /// A unit of work without a reservation of its own, for work on one thread.
     #[must_use]
     pub fn unit(&self) -> Unit<'_> {

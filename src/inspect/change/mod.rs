@@ -1,4 +1,4 @@
-//! What changed between two surfaces: the signed distance at every vertex of the new one, with its uncertainty.
+//! The signed distance between two surfaces at every vertex of the new one, with its uncertainty.
 //!
 //! The distance is that of M3C2 (Lague, Brodu and Leroux, *Accurate 3D comparison of complex topography with
 //! terrestrial laser scanner*, ISPRS Journal 82, 2013), taken at the vertices of a mesh: a cylinder along the normal of
@@ -38,7 +38,7 @@ use areas::{Areas, Sums, Units};
 use measure::Measure;
 use outcrop_codecs::ply_mesh::PlyMesh;
 use outcrop_disk::error::{Error, Result};
-use outcrop_disk::spill::{Sorter, Table};
+use outcrop_disk::spill::{LocalTable, Sorter};
 use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_geom::vector::V3;
 use rows::sections;
@@ -203,14 +203,14 @@ fn measured<W: Witness>(
     let vertices = PlyMesh::open_any(path, workspace)?.vertices();
     let observer = &workspace.observer;
     observer.begin("change", "vertices", vertices);
-    let found = Table::<ChangeRow>::new("change.measured", measure.pieces());
+    let found = LocalTable::<ChangeRow>::kept(workspace, "change.measured")?;
     let mut sums = [Sums::default(); 4];
     let put = |unit: &Unit<'_>, _: &[Vertex], rows: &[ChangeRow]| {
         let mut sums = [Sums::default(); 4];
         for row in rows {
             sums[row.state() as usize].add(row, units);
         }
-        found.put(unit, unit.number(), rows)?;
+        found.put_by(unit, unit.number(), rows)?;
         Ok(sums)
     };
     measure.each("measure", workspace, put, |some| {
@@ -221,10 +221,10 @@ fn measured<W: Witness>(
     let buffer = bytes.min(workspace.memory.available() / 12) + (1 << 20);
     let _held = workspace.reserve("change: sort buffers", buffer + buffer / 2)?;
     let sorter = Sorter::new(workspace, "change.rows", buffer);
-    let (unit, mut rows, mut piece) = (workspace.unit(), Vec::new(), Vec::new());
+    let (mut rows, mut piece) = (Vec::new(), Vec::new());
     for number in 0..measure.pieces() {
         workspace.check_cancel()?;
-        found.get_into(&unit, number, &mut rows)?;
+        found.get_into(number, &mut rows)?;
         if W::SEES {
             measure.read(number, &mut piece)?;
             let both = piece.iter().zip(&rows);
@@ -232,9 +232,7 @@ fn measured<W: Witness>(
         }
         sorter.push(&rows)?;
     }
-    if !workspace.is_resumable() {
-        found.release(workspace)?;
-    }
+    drop(found);
     observer.end();
     Ok((sums, sections(sorter, vertices, workspace)?))
 }
@@ -250,7 +248,7 @@ fn area_alone<W: Witness>(
     let observer = &workspace.observer;
     let vertices = measure.from.shape.side.points;
     observer.begin("what only the old one has", "vertices", vertices);
-    let places = Table::<V3>::new("change.alone", measure.pieces());
+    let places = LocalTable::<V3>::kept(workspace, "change.alone")?;
     let find = |unit: &Unit<'_>, vertices: &[Vertex], rows: &[ChangeRow]| {
         let (mut sums, mut some) = (Sums::default(), Vec::new());
         let both = vertices.iter().zip(rows);
@@ -258,19 +256,16 @@ fn area_alone<W: Witness>(
             sums.add(row, units);
             some.push(vertex.position());
         }
-        places.put(unit, unit.number(), &some)?;
+        places.put_by(unit, unit.number(), &some)?;
         Ok(sums)
     };
     measure.each("find what only the old one has", workspace, find, |some| {
         alone.join(&some)
     })?;
-    let (unit, mut some) = (workspace.unit(), Vec::new());
+    let mut some = Vec::new();
     for number in (0..measure.pieces()).filter(|_| W::SEES) {
-        places.get_into(&unit, number, &mut some)?;
+        places.get_into(number, &mut some)?;
         some.iter().for_each(|place| witness.gone(*place));
-    }
-    if !workspace.is_resumable() {
-        places.release(workspace)?;
     }
     observer.end();
     Ok(alone.area(units))

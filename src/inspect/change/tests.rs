@@ -32,7 +32,7 @@ fn surface(path: &Path, side: f64, n: usize, height: impl Fn(f64, f64) -> f64) -
     path.to_path_buf()
 }
 
-/// What changed between two surfaces, and the rows.
+/// The change between two surfaces, and the rows.
 fn changed(
     old: &Path,
     new: &Path,

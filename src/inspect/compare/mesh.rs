@@ -13,7 +13,7 @@ use outcrop_disk::error::Result;
 use outcrop_disk::spill::Sorter;
 use outcrop_disk::workspace::memory::Reservation;
 use outcrop_disk::workspace::{Unit, Workspace};
-use outcrop_geom::vector::{Box3, V3};
+use outcrop_geom::vector::V3;
 use std::path::Path;
 
 /// Bytes of a vertex in memory, with a bit for its use.
@@ -29,14 +29,8 @@ pub(super) fn read(
 ) -> Result<Shape> {
     let mesh = PlyMesh::open_any(path, workspace)?;
     let reading = Reading {
-        path,
-        name,
-        options,
-        workspace,
         unit,
-        vertices: mesh.vertices(),
-        faces: mesh.faces(),
-        bounds: Box3::EMPTY,
+        ..Reading::of(&mesh, path, name, options, workspace)
     };
     read_with(mesh, reading, None)
 }
@@ -80,16 +74,7 @@ pub(super) fn read_sound(
         seen: 0,
         batch: Vec::new(),
     };
-    let reading = Reading {
-        path,
-        name,
-        options,
-        workspace,
-        unit: None,
-        vertices,
-        faces: mesh.faces(),
-        bounds: Box3::EMPTY,
-    };
+    let reading = Reading::of(&mesh, path, name, options, workspace);
     read_with(mesh, reading, Some(sound))
 }
 

@@ -102,14 +102,12 @@ pub(crate) fn read_side_once(
         samples: 0,
         seed: 0,
     };
-    let mut made = None;
-    let kept = workspace.once(name, |unit| {
+    let make = |unit: &Unit<'_>| {
         let shape = read_by(path, name, &options, Some(unit), workspace)?;
         let kept = shape.kept();
-        made = Some(shape);
-        Ok(kept)
-    })?;
-    made.map_or_else(|| kept.open(path, name, workspace), Ok)
+        Ok((shape, kept))
+    };
+    workspace.once_opened(name, make, |kept| kept.open(path, name, workspace))
 }
 
 /// Distances between two shapes, each a mesh (PLY with faces) or a cloud (in any format of ingest).

@@ -5,6 +5,7 @@ use super::Options;
 use super::pages::{PageWriter, Pages};
 use super::shape::{Items, Kind, Shape, side, unusable, usable};
 use oorandom::Rand64;
+use outcrop_codecs::ply_mesh::PlyMesh;
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::spill::{LocalTable, Row, Sorter, row};
 use outcrop_disk::workspace::memory::Reservation;
@@ -59,7 +60,27 @@ pub(super) struct Reading<'a> {
     pub(super) bounds: Box3,
 }
 
-impl Reading<'_> {
+impl<'a> Reading<'a> {
+    /// A mesh of which nothing was read yet, and whose pages do not survive the attempt.
+    pub(super) fn of(
+        mesh: &PlyMesh,
+        path: &'a Path,
+        name: &'static str,
+        options: &'a Options,
+        workspace: &'a Workspace,
+    ) -> Self {
+        Self {
+            path,
+            name,
+            options,
+            workspace,
+            unit: None,
+            vertices: mesh.vertices(),
+            faces: mesh.faces(),
+            bounds: Box3::EMPTY,
+        }
+    }
+
     /// See [`sorter`]; `part` is the end of the name.
     pub(super) fn sorter<R: Row>(
         &self,

@@ -37,7 +37,7 @@ pub enum Above {
     Mesh(PathBuf),
 }
 
-/// What is measured.
+/// The volume to measure: enclosed, or above and below a level or a mesh.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
     /// From where on; none for the volume that the mesh encloses.

@@ -1,4 +1,4 @@
-//! Writing of pages, and what a later attempt needs to read them.
+//! Writing of pages, and their description for a later attempt.
 
 use super::{Item, Pages};
 use outcrop_disk::error::Result;
@@ -74,17 +74,15 @@ impl<T: Item> Pages<T> {
         step: &str,
         make: impl FnOnce(&Unit<'_>) -> Result<Self>,
     ) -> Result<Self> {
-        let mut made = None;
-        let kept = workspace.once(step, |unit| {
+        let make = |unit: &Unit<'_>| {
             let pages = make(unit)?;
             let kept = pages.kept();
-            made = Some(pages);
-            Ok(kept)
-        })?;
-        made.map_or_else(|| kept.open(workspace), Ok)
+            Ok((pages, kept))
+        };
+        workspace.once_opened(step, make, |kept| kept.open(workspace))
     }
 
-    /// What a later attempt needs to open them.
+    /// Their description, with which a later attempt opens them.
     pub(crate) fn kept(&self) -> KeptPages<T> {
         KeptPages {
             name: self.stored.name().to_owned(),
@@ -129,7 +127,6 @@ impl<'a, T: Item> PageWriter<'a, T> {
     ) -> Result<Self> {
         let page = count.div_ceil(MOST_PAGES).max(LEAST) as usize;
         let pages = count.div_ceil(page as u64);
-        let unit = unit.filter(|_| workspace.is_resumable());
         Ok(Self {
             held: reserve::<T>(workspace, pages, page)?,
             stored: match unit {
@@ -168,7 +165,7 @@ impl<'a, T: Item> PageWriter<'a, T> {
         if !self.pending.is_empty() {
             self.flush()?;
         }
-        if let Some(unit) = self.unit {
+        if let Some(unit) = self.unit.filter(|unit| unit.is_resumable()) {
             let kept = LocalTable::<PageBox>::kept(unit, &boxes_of(self.stored.name()))?;
             for (section, boxes) in self.boxes.chunks(BOXES).enumerate() {
                 let corners = boxes.iter().map(|Box3 { min, max }| PageBox {
