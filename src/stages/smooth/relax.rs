@@ -267,7 +267,7 @@ pub fn relax(
     let levels = Levels::new(store.len());
     let Found {
         spacings,
-        mut levels,
+        levels,
         noisy,
     } = look(store, relaxing, levels, workspace)?;
     let mut relaxed = Relaxed {
@@ -276,48 +276,59 @@ pub fn relax(
         noise: Levels::default(),
         stats: RelaxStats::default(),
     };
-    if !noisy {
-        let left = u64::from(relaxing.rounds) * store.len() as u64;
-        workspace.observer.advance(left);
-        return Ok(relaxed);
+    let mut passes = 0;
+    if noisy {
+        let _rounds_held = workspace.reserve("rounds of smoothing", bytes)?;
+        passes = all_rounds(store, tiles, relaxing, levels, &mut relaxed, workspace)?;
     }
-    let _rounds_held = workspace.reserve("rounds of smoothing", bytes)?;
+    let left = u64::from(relaxing.rounds - passes) * store.len() as u64;
+    workspace.observer.advance(left);
+    Ok(relaxed)
+}
+
+/// Smooths noisy points, whose `levels` of noise become those of `relaxed`, until no point moves. Returns the number
+/// of passes over all points.
+fn all_rounds(
+    store: &PointStore,
+    tiles: TileRanges,
+    relaxing: Relaxing,
+    mut levels: Levels,
+    relaxed: &mut Relaxed,
+    workspace: &Workspace,
+) -> Result<u32> {
     // The levels of noise after the first round, which counts the rounds by them.
     let mut other = Levels::new(store.len());
     let mut moves = Moves::default();
-    for number in 1..=relaxing.rounds {
+    let (mut passes, mut rounds) = (0, 0);
+    while passes < relaxing.rounds {
+        passes += 1;
         let round = Round {
-            number,
+            number: passes,
             relaxing,
             original: store,
             levels: &levels,
         };
-        let before = relaxed
-            .store
-            .as_ref()
-            .map(|store| store.open(workspace))
-            .transpose()?;
+        let before = relaxed.store.as_ref();
+        let before = before.map(|store| store.open(workspace)).transpose()?;
         let current = before.as_ref().unwrap_or(store);
         let (next, done) = one_round(current, tiles, &round, &mut other, workspace)?;
         drop(before);
-        if number == 1 {
+        if passes == 1 {
             std::mem::swap(&mut levels, &mut other);
         }
         if done.moved() == 0 {
             next.release(workspace)?;
-            let left = u64::from(relaxing.rounds - number) * store.len() as u64;
-            workspace.observer.advance(left);
             break;
         }
-        relaxed.stats.rounds = number;
+        rounds = passes;
         moves.add(&done);
         if let Some(old) = relaxed.store.replace(next) {
             old.release(workspace)?;
         }
     }
     relaxed.noise = other;
-    relaxed.stats = moves.stats(relaxed.stats.rounds, relaxing.step);
-    Ok(relaxed)
+    relaxed.stats = moves.stats(rounds, relaxing.step);
+    Ok(passes)
 }
 
 /// Moves the points of one round; returns the new positions and what moved.
