@@ -13,7 +13,7 @@ use crate::cells::{TileRanges, each_around};
 use crate::levels::{HIGHEST, Levels};
 use crate::order::{PointStore, StoredPoints};
 use crate::spacing::{StoredSpacings, spacing2};
-use crate::tiles::near::Around;
+use crate::tiles::near::{Around, Nearer};
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_geom::Point;
@@ -114,7 +114,7 @@ struct Mover<P> {
     count: usize,
     fewer: usize,
     layered: Feet<Noisy>,
-    keys: Vec<(u64, usize)>,
+    nearer: Nearer,
     /// Receives the noisy points and the positions to which they move.
     put: P,
 }
@@ -134,7 +134,7 @@ impl<P: FnMut(Noisy, Point)> Settle<Noisy> for Mover<P> {
     }
 
     fn settle_layered(&mut self, noisy: Noisy, around: &mut Around) {
-        around.keep_nearest(self.fewer, &mut self.keys);
+        around.keep_nearest(self.fewer, &mut self.nearer);
         let reach2 = around.last2();
         let put = &mut self.put;
         self.layered.add(
@@ -227,7 +227,7 @@ impl Round<'_> {
             count,
             fewer: self.fewer(),
             layered: Feet::default(),
-            keys: Vec::new(),
+            nearer: Nearer::default(),
             put,
         };
         let wanted = |id: usize| self.is_first() || u32::from(self.levels.get(id)) >= self.number;

@@ -22,7 +22,7 @@ mod query;
 mod sums;
 
 pub use super::neighbors::Sums;
-pub use around::Around;
+pub use around::{Around, Nearer};
 use divided::list_divided;
 pub use groups::{Group, Neighborhood};
 use list::list_nearest;

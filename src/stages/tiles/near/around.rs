@@ -1,11 +1,11 @@
 //! The nearest neighbours of many points together with each point itself, in order of id. Nothing is sorted.
 
-use super::sums::{Unknown, divided_body};
-use super::{OwnPage, Search};
+use super::sums::{Unknown, divide_body, divided_body, padded};
+use super::{OwnPage, Search, above};
 use crate::ids::Id;
 use crate::tiles::Tile;
 use crate::tiles::neighbors::Neighbors;
-use outcrop_geom::kernels::{BLOCK, Pick, kernel};
+use outcrop_geom::kernels::{BLOCK, Level, Pick, distances_body, kernel};
 use outcrop_geom::{Point, distance2};
 
 /// A point and its nearest neighbours, in order of id, in columns that end with zeros to whole groups of
@@ -17,6 +17,14 @@ pub struct Around {
     columns: [Vec<u32>; 3],
     ids: Vec<u32>,
     last2: u64,
+}
+
+/// What [`Around::keep_nearest`] needs, in memory that is reused.
+#[derive(Debug, Default)]
+pub struct Nearer {
+    level: Level,
+    distances: Vec<f32>,
+    keys: Vec<(u64, usize)>,
 }
 
 impl Around {
@@ -72,12 +80,19 @@ impl Around {
         self.end();
     }
 
-    /// Keeps the `count` that come first by distance, then by id, and the point itself, all without their ids;
-    /// `keys` are reused.
-    pub fn keep_nearest(&mut self, count: usize, keys: &mut Vec<(u64, usize)>) {
+    /// Keeps the `count` that come first by distance, then by id, and the point itself, all without their ids.
+    pub fn keep_nearest(&mut self, count: usize, memory: &mut Nearer) {
         if self.count <= count + 1 {
             return;
         }
+        if !keep_divided(memory.level, self, count, &mut memory.distances) {
+            self.keep_ranked(count, &mut memory.keys);
+        }
+        self.end();
+    }
+
+    /// As [`Around::keep_nearest`], also where ids decide.
+    fn keep_ranked(&mut self, count: usize, keys: &mut Vec<(u64, usize)>) {
         keys.clear();
         keys.extend((0..self.count).map(|place| self.key(place)));
         // The point itself is one of them, or all are in its place.
@@ -93,7 +108,6 @@ impl Around {
             }
         }
         (self.count, self.last2) = (kept, last.0);
-        self.end();
     }
 
     /// Squared distance and place of a point.
@@ -208,4 +222,42 @@ fn take_body<P: Pick>(
     around.last2 = last2;
     around.end();
     Ok(())
+}
+
+kernel! {
+    /// Keeps the point and its `count` nearest neighbours; false if ties or rounding do not let them be divided from
+    /// the others.
+    fn keep_divided(around: &mut Around, count: usize, distances: &mut Vec<f32>) -> bool = keep_body<Eight>
+}
+
+#[inline(always)]
+fn keep_body<P: Pick>(around: &mut Around, count: usize, distances: &mut Vec<f32>) -> bool {
+    let (all, most) = (around.count, above(around.last2));
+    let room = all.next_multiple_of(BLOCK);
+    let padded = padded(room);
+    distances.resize(padded.max(distances.len()), 0.0);
+    let distances = &mut distances[..padded];
+    let columns = around.columns.each_ref();
+    let [x, y, z] = columns.map(|column| bytemuck::cast_slice(&column[..all]));
+    distances_body(x, y, z, [0; 3], &mut distances[..all]);
+    distances[all..].fill(f32::INFINITY);
+    let Some(limit) = divide_body::<P>(distances, all, count + 1, most) else {
+        return false;
+    };
+    let mut kept = 0;
+    let blocks = distances[..room].as_chunks::<BLOCK>().0;
+    for (block, distances) in blocks.iter().enumerate() {
+        let within = P::within(distances, limit);
+        for column in &mut around.columns {
+            // Packed values never overtake those that are read.
+            if let Some(values) = column[block * BLOCK..].first_chunk().copied() {
+                P::pack_at(&values, within, column, kept);
+            }
+        }
+        kept += within.count_ones() as usize;
+    }
+    let places = 0..kept;
+    let farthest = places.map(|place| around.key(place).0).max();
+    (around.count, around.last2) = (kept, farthest.unwrap_or(0));
+    true
 }

@@ -170,7 +170,7 @@ pub(super) fn divided_body<P: Pick, const IDS: bool>(
         return Err(Unknown::Few);
     }
     let room = picked.next_multiple_of(BLOCK);
-    let padded = FEW.into_iter().find(|few| room <= *few).unwrap_or(room);
+    let padded = padded(room);
     search
         .distances
         .resize(padded.max(search.distances.len()), 0.0);
@@ -186,6 +186,12 @@ pub(super) fn divided_body<P: Pick, const IDS: bool>(
     Ok((room, limit))
 }
 
+/// The number of places to which so many distances are padded, so that several limits can be tried at once.
+#[inline(always)]
+pub(super) fn padded(room: usize) -> usize {
+    FEW.into_iter().find(|few| room <= *few).unwrap_or(room)
+}
+
 /// An upper bound on the squared distances of the points whose approximate ones are within `limit`.
 #[inline(always)]
 pub(super) fn certain_body(limit: f32) -> f64 {
@@ -195,7 +201,7 @@ pub(super) fn certain_body(limit: f32) -> f64 {
 /// A limit within which exactly `wanted` of the first `count` numbers lie, with no other number close to it;
 /// the numbers are roughly evenly distributed up to `most`, and those after the last are infinite.
 #[inline(always)]
-fn divide_body<P: Pick>(numbers: &[f32], count: usize, wanted: usize, most: f32) -> Option<f32> {
+pub(super) fn divide_body<P: Pick>(numbers: &[f32], count: usize, wanted: usize, most: f32) -> Option<f32> {
     let (all, wanted) = (count as u32, wanted as u32);
     if let Ok(few) = numbers.try_into() {
         divide_few::<P, { FEW[0] }>(few, all, wanted, most)
