@@ -1,6 +1,6 @@
 //! Compares the search in a tile with all distances, for every level of the kernels.
 
-use super::near::Search;
+use super::near::{Around, Nearer, Search};
 use super::neighbors::Neighbors;
 use super::walk::{PageCache, Walk};
 use super::wanted::Wanted;
@@ -215,6 +215,33 @@ fn check_groups(points: &[Point], tile: &Tile, k: usize, search: &mut Search) ->
     known
 }
 
+/// Compares the neighbours around all or only some of the points, and the nearer half of them, with those of a
+/// sorted list.
+fn check_around(points: &[Point], tile: &Tile, k: usize, level: Level) {
+    let mut nearer = Nearer::at(level);
+    let each = |id: Id, point: Point, around: Option<&mut Around>| {
+        let Some(around) = around else { return };
+        let all = all_near(points, id.index());
+        for count in [k, k / 2] {
+            around.keep_nearest(count, &mut nearer);
+            let mut ids: Vec<Id> = all[..count].iter().map(|near| near.1).chain([id]).collect();
+            ids.sort_unstable();
+            let columns = around.columns();
+            assert_eq!(around.count(), ids.len());
+            for (place, id) in ids.iter().enumerate() {
+                let difference = columns.map(|column| i64::from(column[place]));
+                assert_eq!(difference, outcrop_geom::sub(points[id.index()], point));
+            }
+            let rest = columns.iter().flat_map(|column| &column[ids.len()..]);
+            assert!(rest.into_iter().all(|c| *c == 0));
+            let last2 = count.checked_sub(1).map_or(0, |last| all[last].0);
+            assert_eq!(around.last2(), last2);
+        }
+    };
+    let wanted = |id: usize| !id.is_multiple_of(3);
+    tile.for_some_around(k, &mut Search::at(level), wanted, |_| (), each);
+}
+
 /// Without ties, nearly all neighbourhoods are known, also where the density changes.
 #[test]
 fn groups_know_most_neighbors() {
@@ -259,6 +286,7 @@ proptest! {
                 check(&points, &tile, k, &mut Search::at(level));
                 check_sums(&points, &tile, k, &mut Search::at(level));
                 check_groups(&points, &tile, k, &mut Search::at(level));
+                check_around(&points, &tile, k, level);
             }
         }
     }

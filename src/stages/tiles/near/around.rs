@@ -27,6 +27,17 @@ pub struct Nearer {
     keys: Vec<(u64, usize)>,
 }
 
+impl Nearer {
+    /// With the kernels of `level`; levels differ only in speed.
+    #[must_use]
+    pub fn at(level: Level) -> Self {
+        Self {
+            level,
+            ..Self::default()
+        }
+    }
+}
+
 impl Around {
     /// Number of points, the one in the middle included.
     #[must_use]

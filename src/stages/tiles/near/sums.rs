@@ -201,7 +201,12 @@ pub(super) fn certain_body(limit: f32) -> f64 {
 /// A limit within which exactly `wanted` of the first `count` numbers lie, with no other number close to it;
 /// the numbers are roughly evenly distributed up to `most`, and those after the last are infinite.
 #[inline(always)]
-pub(super) fn divide_body<P: Pick>(numbers: &[f32], count: usize, wanted: usize, most: f32) -> Option<f32> {
+pub(super) fn divide_body<P: Pick>(
+    numbers: &[f32],
+    count: usize,
+    wanted: usize,
+    most: f32,
+) -> Option<f32> {
     let (all, wanted) = (count as u32, wanted as u32);
     if let Ok(few) = numbers.try_into() {
         divide_few::<P, { FEW[0] }>(few, all, wanted, most)
