@@ -120,7 +120,7 @@ pub(super) fn warning(files: &[FileStats], crs: &Crs, observer: &dyn Observer) -
             })
         }
         CrsKind::Geocentric => Some(format!(
-            "{path}: its reference system {crs} is geocentric, so z is not up, and which side is out may be \
+            "{path}: its coordinates are geocentric ({crs}), so z is not up, and which side is out may be \
              wrong without {}: {}",
             option("facing"),
             how("CODE".into())

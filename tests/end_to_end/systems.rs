@@ -305,7 +305,7 @@ fn degrees_are_no_lengths_and_it_is_said() {
     );
     let (_, said) = info(&cloud, &[]);
     assert!(
-        said.contains("EPSG:4978 is geocentric, so z is not up"),
+        said.contains("its coordinates are geocentric (EPSG:4978), so z is not up"),
         "{said}"
     );
 }
