@@ -150,10 +150,10 @@ fn add<F: Numbers, const N: usize>(sums: &mut [F; N], terms: [F; N]) {
     }
 }
 
-/// Adds the terms of a group of positions to the sums of a surface. Each product is added as soon as it is known,
-/// and the last ones first, so that few of them are in registers at a time beside the sums.
+/// Adds the terms with heights, of the weights, and of first order of a group of positions to the sums of a surface.
+/// Each product is added as soon as it is known, so that few of them are in registers at a time beside the sums.
 #[inline(always)]
-fn add_surface_terms<F: Numbers>(s: &mut [F; 23], [u, v, h]: [F; 3], w: F) {
+fn add_height_terms<F: Numbers>(s: &mut [F; 23], [u, v, h]: [F; 3], w: F) {
     s[0] = s[0] + w;
     s[22] = s[22] + w * w;
     let wh = w * h;
@@ -162,9 +162,20 @@ fn add_surface_terms<F: Numbers>(s: &mut [F; 23], [u, v, h]: [F; 3], w: F) {
     let wu = w * u;
     s[1] = s[1] + wu;
     s[16] = s[16] + wu * h;
+    s[18] = s[18] + wu * u * h;
+    s[19] = s[19] + wu * v * h;
+    let wv = w * v;
+    s[2] = s[2] + wv;
+    s[17] = s[17] + wv * h;
+    s[20] = s[20] + wv * v * h;
+}
+
+/// Adds the other terms: those of second to fourth order along the plane.
+#[inline(always)]
+fn add_plane_terms<F: Numbers>(s: &mut [F; 23], [u, v]: [F; 2], w: F) {
+    let wu = w * u;
     let wuu = wu * u;
     s[3] = s[3] + wuu;
-    s[18] = s[18] + wuu * h;
     let wuuu = wuu * u;
     s[6] = s[6] + wuuu;
     s[10] = s[10] + wuuu * u;
@@ -172,15 +183,9 @@ fn add_surface_terms<F: Numbers>(s: &mut [F; 23], [u, v, h]: [F; 3], w: F) {
     let wuuv = wuu * v;
     s[7] = s[7] + wuuv;
     s[12] = s[12] + wuuv * v;
-    let wuv = wu * v;
-    s[4] = s[4] + wuv;
-    s[19] = s[19] + wuv * h;
-    let wv = w * v;
-    s[2] = s[2] + wv;
-    s[17] = s[17] + wv * h;
-    let wvv = wv * v;
+    s[4] = s[4] + wu * v;
+    let wvv = w * v * v;
     s[5] = s[5] + wvv;
-    s[20] = s[20] + wvv * h;
     let wuvv = wvv * u;
     s[8] = s[8] + wuvv;
     s[13] = s[13] + wuvv * v;
@@ -232,6 +237,13 @@ fn put_surface_sums<F: Eight, const SQUARES: bool>(
     put_totals::<F, 23>(first, last, sums, lane);
 }
 
+/// One part of the weights of a group, or their squares.
+#[inline(always)]
+fn weight<F: Eight, const SQUARES: bool>(weights: &[f64; GROUP], part: usize) -> F::Part {
+    let w = F::load_part(weights, part);
+    if SQUARES { w * w } else { w }
+}
+
 /// The sums over one part of each group.
 #[inline(always)]
 fn surface_sums<F: Eight, const SQUARES: bool>(
@@ -242,9 +254,18 @@ fn surface_sums<F: Eight, const SQUARES: bool>(
     let mut s = [F::Part::splat(0.0); 23];
     for (((u, v), h), w) in u.iter().zip(v).zip(h).zip(weights) {
         let (u, v) = (F::load_part(u, part), F::load_part(v, part));
-        let (h, w) = (F::load_part(h, part), F::load_part(w, part));
-        let w = if SQUARES { w * w } else { w };
-        add_surface_terms(&mut s, [u, v, h], w);
+        let (h, w) = (F::load_part(h, part), weight::<F, SQUARES>(w, part));
+        add_height_terms(&mut s, [u, v, h], w);
+        if F::PARTS == 1 {
+            add_plane_terms(&mut s, [u, v], w);
+        }
+    }
+    // Few registers do not hold all sums at once.
+    if F::PARTS > 1 {
+        for ((u, v), w) in u.iter().zip(v).zip(weights) {
+            let (u, v) = (F::load_part(u, part), F::load_part(v, part));
+            add_plane_terms(&mut s, [u, v], weight::<F, SQUARES>(w, part));
+        }
     }
     s
 }
