@@ -150,7 +150,7 @@ fn add<F: Numbers, const N: usize>(sums: &mut [F; N], terms: [F; N]) {
     }
 }
 
-/// Adds the terms with heights, of the weights, and of first order of a group of positions to the sums of a surface.
+/// Adds a group of positions to the sums of weights, of first-order terms and of terms with heights.
 /// Each product is added as soon as it is known, so that few of them are in registers at a time beside the sums.
 #[inline(always)]
 fn add_height_terms<F: Numbers>(s: &mut [F; 23], [u, v, h]: [F; 3], w: F) {
@@ -170,7 +170,7 @@ fn add_height_terms<F: Numbers>(s: &mut [F; 23], [u, v, h]: [F; 3], w: F) {
     s[20] = s[20] + wv * v * h;
 }
 
-/// Adds the other terms: those of second to fourth order along the plane.
+/// Adds a group of positions to the other sums: terms of second to fourth order along the plane.
 #[inline(always)]
 fn add_plane_terms<F: Numbers>(s: &mut [F; 23], [u, v]: [F; 2], w: F) {
     let wu = w * u;

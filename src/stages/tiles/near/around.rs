@@ -19,11 +19,13 @@ pub struct Around {
     last2: u64,
 }
 
-/// What [`Around::keep_nearest`] needs, in memory that is reused.
+/// Buffers of [`Around::keep_nearest`], reused from one point to the next.
 #[derive(Debug, Default)]
 pub struct Nearer {
     level: Level,
+    /// Approximate squared distances of the neighbours, in steps.
     distances: Vec<f32>,
+    /// Squared distance, in steps, and place of each neighbour.
     keys: Vec<(u64, usize)>,
 }
 
@@ -102,7 +104,7 @@ impl Around {
         self.end();
     }
 
-    /// As [`Around::keep_nearest`], also where ids decide.
+    /// Keeps them by exact distance, and by id where distances are equal.
     fn keep_ranked(&mut self, count: usize, keys: &mut Vec<(u64, usize)>) {
         keys.clear();
         keys.extend((0..self.count).map(|place| self.key(place)));
@@ -267,8 +269,7 @@ fn keep_body<P: Pick>(around: &mut Around, count: usize, distances: &mut Vec<f32
         }
         kept += within.count_ones() as usize;
     }
-    let places = 0..kept;
-    let farthest = places.map(|place| around.key(place).0).max();
+    let farthest = (0..kept).map(|place| around.key(place).0).max();
     (around.count, around.last2) = (kept, farthest.unwrap_or(0));
     true
 }

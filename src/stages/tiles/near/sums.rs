@@ -186,7 +186,7 @@ pub(super) fn divided_body<P: Pick, const IDS: bool>(
     Ok((room, limit))
 }
 
-/// The number of places to which so many distances are padded, so that several limits can be tried at once.
+/// The length to which `room` distances are padded for [`divide_body`]: one of [`FEW`], or `room` if it is longer.
 #[inline(always)]
 pub(super) fn padded(room: usize) -> usize {
     FEW.into_iter().find(|few| room <= *few).unwrap_or(room)
