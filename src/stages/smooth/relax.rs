@@ -194,7 +194,7 @@ impl Round<'_> {
             rounds: Levels::new(if self.is_first() { ids.len() } else { 0 }),
             moves: Moves::default(),
         };
-        // Points are noisy only where some of them have a level.
+        // Points of a run without a level stay.
         if !self.levels.any(&ids) {
             return Ok(done);
         }
@@ -230,8 +230,15 @@ impl Round<'_> {
             nearer: Nearer::default(),
             put,
         };
-        let wanted = |id: usize| self.is_first() || u32::from(self.levels.get(id)) >= self.number;
-        let first = ids.start;
+        let (first, end) = (ids.start, ids.end);
+        let is_in_noise = |id: usize| {
+            let run = id - id % METHOD.curve.run;
+            self.levels.any(&(run..(run + METHOD.curve.run).min(end)))
+        };
+        let wanted = |id: usize| match self.is_first() {
+            true => is_in_noise(id),
+            false => u32::from(self.levels.get(id)) >= self.number,
+        };
         each_around(unit, store, ids, count, wanted, |id, point, around| {
             let rounds = if self.is_first() {
                 let rounds = rounds(self.levels, around).min(most);

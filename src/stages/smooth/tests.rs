@@ -138,6 +138,22 @@ fn only_noisy_points_move_and_tiles_do_not_matter() {
     }
 }
 
+/// The last points have no noise, but noisy neighbours; they are a tile of their own, or not.
+#[test]
+fn points_without_noise_among_noisy_ones_stay_whatever_the_tiles() {
+    // Reaches differ, so that some neighbours are not in the tile.
+    let mut points = sheet(40, |_, n| noise(n));
+    points.extend((0..30).map(|n| [4000 + 170 * n * n, 150 * n, 500 + noise(n)]));
+    points.push([1010, 1020, 90_000]);
+    let (expected, stats) = relaxed(&points, 3, 5000, 256);
+    assert!(stats.rounds == 3 && stats.moved > 1000);
+    for (tile, page) in [(16, 1), (16, 2), (48, 3), (7, 5), (100, 16), (333, 64)] {
+        let (shape, same) = relaxed(&points, 3, tile, page);
+        assert_eq!(same, stats, "tiles of {tile}, pages of {page}");
+        assert!(shape == expected, "tiles of {tile}, pages of {page}");
+    }
+}
+
 #[test]
 fn regions_are_divided_anyhow() {
     let in_order = |points: &[Point]| {
