@@ -122,16 +122,11 @@ pub fn relax(points: &[Point], settings: &Settings) -> Relaxed {
     }
     let most = settings.relax.min(3) as u8;
     // A run without noise stays.
-    let is_in_noise = |i: usize| {
-        let first = i - i % RUN;
-        let run = &levels[first..(first + RUN).min(levels.len())];
-        run.iter().any(|level| *level > 0)
-    };
-    let in_rounds = |i: usize| match is_in_noise(i) {
-        true => rounds(points, &levels, i, k).min(most),
-        false => 0,
-    };
-    let all: Vec<u8> = (0..points.len()).map(in_rounds).collect();
+    let run = |i: usize| levels[i - i % RUN..].iter().take(RUN);
+    let is_in_noise = |i: usize| run(i).any(|level| *level > 0);
+    let own = |i: usize| rounds(points, &levels, i, k).min(most);
+    let all = (0..points.len()).map(|i| if is_in_noise(i) { own(i) } else { 0 });
+    let all: Vec<u8> = all.collect();
     relaxed.moved = all.iter().filter(|rounds| **rounds > 0).count();
     relaxed.kept = levels
         .iter()

@@ -176,6 +176,13 @@ impl Round<'_> {
         self.number == 1
     }
 
+    /// True if a point of the run of `id` has a level of noise; the points of other runs stay.
+    fn is_in_noise(&self, id: usize) -> bool {
+        let first = id - id % METHOD.curve.run;
+        let last = (first + METHOD.curve.run).min(self.original.len());
+        self.levels.any(&(first..last))
+    }
+
     /// The number of neighbours in layers: those of a plane, but enough for a surface of second order.
     fn fewer(&self) -> usize {
         self.relaxing.neighbors.max(METHOD.plane.neighbors)
@@ -194,7 +201,7 @@ impl Round<'_> {
             rounds: Levels::new(if self.is_first() { ids.len() } else { 0 }),
             moves: Moves::default(),
         };
-        // Points of a run without a level stay.
+        // No run has a level, so all points stay.
         if !self.levels.any(&ids) {
             return Ok(done);
         }
@@ -230,14 +237,13 @@ impl Round<'_> {
             nearer: Nearer::default(),
             put,
         };
-        let (first, end) = (ids.start, ids.end);
-        let is_in_noise = |id: usize| {
-            let run = id - id % METHOD.curve.run;
-            self.levels.any(&(run..(run + METHOD.curve.run).min(end)))
-        };
-        let wanted = |id: usize| match self.is_first() {
-            true => is_in_noise(id),
-            false => u32::from(self.levels.get(id)) >= self.number,
+        let first = ids.start;
+        let wanted = |id: usize| {
+            if self.is_first() {
+                self.is_in_noise(id)
+            } else {
+                u32::from(self.levels.get(id)) >= self.number
+            }
         };
         each_around(unit, store, ids, count, wanted, |id, point, around| {
             let rounds = if self.is_first() {

@@ -54,6 +54,18 @@ fn relaxed_as(
     (shape.slice(0..shape.len()).unwrap(), relaxed.stats)
 }
 
+/// Positions after three rounds of smoothing at most, and the counts, in one tile; the same with tiles and pages of
+/// other sizes.
+fn relaxed_by_tiles(points: &[Point], sizes: &[(u32, usize)]) -> (Vec<Point>, RelaxStats) {
+    let (expected, stats) = relaxed(points, 3, 5000, 256);
+    for &(tile, page) in sizes {
+        let (shape, same) = relaxed(points, 3, tile, page);
+        assert_eq!(same, stats, "tiles of {tile}, pages of {page}");
+        assert!(shape == expected, "tiles of {tile}, pages of {page}");
+    }
+    (expected, stats)
+}
+
 fn off_plane(points: &[Point]) -> f64 {
     let squares = points.iter().map(|p| f64::from(p[2] - 500).powi(2));
     (squares.sum::<f64>() / points.len() as f64).sqrt()
@@ -127,31 +139,23 @@ fn details_stay_unless_there_is_noise() {
 #[test]
 fn only_noisy_points_move_and_tiles_do_not_matter() {
     let points = sheet(50, |x, n| if x < 25 { 0 } else { noise(n) });
-    let (expected, stats) = relaxed(&points, 3, 1000, 256);
+    let sizes = [(100, 16), (7, 3), (333, 64), (1000, 1)];
+    let (expected, stats) = relaxed_by_tiles(&points, &sizes);
     let half = points.len() as u64 / 2;
     assert!(stats.moved > half * 3 / 4 && stats.moved <= half);
     assert!(expected.iter().all(|p| p[0] >= 2500 || p[2] == 500));
-    for (tile, page) in [(100, 16), (7, 3), (333, 64), (1000, 1)] {
-        let (shape, same) = relaxed(&points, 3, tile, page);
-        assert_eq!(same, stats, "tiles of {tile}, pages of {page}");
-        assert!(shape == expected, "tiles of {tile}, pages of {page}");
-    }
 }
 
-/// The last points have no noise, but noisy neighbours; they are a tile of their own, or not.
+/// Some points have no noise, but noisy neighbours; they are a tile of their own, or not.
 #[test]
 fn points_without_noise_among_noisy_ones_stay_whatever_the_tiles() {
     // Reaches differ, so that some neighbours are not in the tile.
     let mut points = sheet(40, |_, n| noise(n));
     points.extend((0..30).map(|n| [4000 + 170 * n * n, 150 * n, 500 + noise(n)]));
     points.push([1010, 1020, 90_000]);
-    let (expected, stats) = relaxed(&points, 3, 5000, 256);
+    let sizes = [(16, 1), (16, 2), (48, 3), (7, 5), (100, 16), (333, 64)];
+    let (_, stats) = relaxed_by_tiles(&points, &sizes);
     assert!(stats.rounds == 3 && stats.moved > 1000);
-    for (tile, page) in [(16, 1), (16, 2), (48, 3), (7, 5), (100, 16), (333, 64)] {
-        let (shape, same) = relaxed(&points, 3, tile, page);
-        assert_eq!(same, stats, "tiles of {tile}, pages of {page}");
-        assert!(shape == expected, "tiles of {tile}, pages of {page}");
-    }
 }
 
 #[test]
