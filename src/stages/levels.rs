@@ -88,6 +88,11 @@ impl Levels {
         self.0[place / EACH] |= level << (2 * (place % EACH));
     }
 
+    /// Sets the number at a place to 0.
+    pub fn clear(&mut self, place: usize) {
+        self.0[place / EACH] &= !(3 << (2 * (place % EACH)));
+    }
+
     /// Copies numbers to the places from `first` on, a multiple of four.
     pub fn put(&mut self, first: usize, levels: &Self) {
         self.0[first / EACH..][..levels.0.len()].copy_from_slice(&levels.0);

@@ -29,20 +29,25 @@ fn moved(points: &[Point], i: usize, k: usize) -> Point {
     })
 }
 
-/// The offset from a point to the surface through it and `count` others, and the weighted mean of the squared
+/// The offset from a point to the surface through it and its `count` nearest, and the weighted mean of the squared
 /// heights over the surface of second order; `None` if there is no surface.
 pub fn offset(points: &[Point], i: usize, count: usize) -> Option<(Vec3, f64)> {
-    let mut others = by_distance(points, i);
-    others.truncate(count);
-    let last2 = others
-        .last()
-        .map_or(0, |&j| distance2(points[i], points[j]));
+    let mut around = by_distance(points, i);
+    around.truncate(count);
+    around.insert(0, i);
+    offset_from(points, i, &around)
+}
+
+/// The same for the surface through the points `around`.
+pub fn offset_from(points: &[Point], i: usize, around: &[usize]) -> Option<(Vec3, f64)> {
+    let distances = around.iter().map(|&j| distance2(points[i], points[j]));
+    let last2 = distances.max().unwrap_or(0);
     let reach = (1.1 * last2 as f64).sqrt();
     if last2 == 0 {
         return None;
     }
     let mut all = Vec::new();
-    for j in [i].into_iter().chain(others) {
+    for &j in around {
         let at = sub(points[j], points[i]).map(|c| c as f64 / reach);
         let weight = 1.0 - dot(at, at);
         all.push(Weighted { at, weight });

@@ -2,7 +2,7 @@
 
 use super::Settings;
 use super::cells::{by_distance, widened_plane};
-use super::edges::{heights2, offset};
+use super::edges::{heights2, offset_from};
 use outcrop_geom::lattice::COORDINATE_LIMIT;
 use outcrop_geom::{Point, distance2};
 
@@ -72,35 +72,77 @@ fn rounds(points: &[Point], levels: &[u8], i: usize, k: usize) -> u8 {
         .count() as u8
 }
 
-/// The position to which a noisy point moves; one too far from the surface stays. Where more neighbours lie in
-/// layers, fewer are used.
-fn moved(points: &[Point], i: usize, k: usize, rounds: u8) -> Point {
-    let others = by_distance(points, i);
-    let last2 = |count: usize| {
-        let last = others[..count.min(others.len())].last();
-        last.map_or(0, |&j| distance2(points[i], points[j]))
-    };
-    let mut count = 2 * k;
-    let Some((mut offset, mean2)) = offset(points, i, count) else {
-        return points[i];
+/// A point and those nearest to it that are not left out; itself only if it is not.
+fn around(points: &[Point], i: usize, left_out: &[bool]) -> Vec<usize> {
+    let mut around = by_distance(points, i);
+    around.insert(0, i);
+    around.retain(|&j| !left_out[j]);
+    around
+}
+
+/// The nearest of the points around a point, one more than `count`.
+fn nearest(around: &[usize], count: usize) -> &[usize] {
+    &around[..around.len().min(count + 1)]
+}
+
+/// Squared distance of the last of the points around a point.
+fn last2(points: &[Point], i: usize, around: &[usize]) -> u64 {
+    let distances = around.iter().map(|&j| distance2(points[i], points[j]));
+    distances.max().unwrap_or(0)
+}
+
+/// True if the mean squared height of the `count` nearest over their surface, which reach as far as `2 k` of all points,
+/// is more than noise that asks for so many rounds explains.
+fn has_layers(
+    points: &[Point],
+    i: usize,
+    around: &[usize],
+    (count, k): (usize, usize),
+    rounds: u8,
+) -> bool {
+    let around = nearest(around, count);
+    let Some((_, mean2)) = offset_from(points, i, around) else {
+        return false;
     };
     let limit = 0.4 * f64::from(rounds);
-    let spacing2 = std::f64::consts::PI * last2(count) as f64 / count as f64;
-    if k.max(30) < count && mean2 > limit * limit * spacing2 {
-        count = k.max(30);
-        match super::edges::offset(points, i, count) {
-            Some(fewer) => offset = fewer.0,
-            None => return points[i],
-        }
-    }
+    let spacing2 = std::f64::consts::PI * last2(points, i, around) as f64 / (2 * k) as f64;
+    mean2 > limit * limit * spacing2
+}
+
+/// The position to which a point moves by `count` of the points around it, or by fewer in layers; one too far from the
+/// surface stays.
+fn moved(
+    points: &[Point],
+    i: usize,
+    around: &[usize],
+    (count, k): (usize, usize),
+    rounds: u8,
+) -> Point {
+    let fewer = k.max(30);
+    let in_layers = fewer < count && has_layers(points, i, around, (count, k), rounds);
+    let around = nearest(around, if in_layers { fewer } else { count });
+    let Some((offset, _)) = offset_from(points, i, around) else {
+        return points[i];
+    };
     let length2 = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2];
-    if length2 > 0.25 * last2(count) as f64 {
+    if length2 > 0.25 * last2(points, i, around) as f64 {
         return points[i];
     }
     std::array::from_fn(|axis| {
         let to = i64::from(points[i][axis]) + offset[axis].round() as i64;
         to.clamp(0, COORDINATE_LIMIT - 1) as i32
     })
+}
+
+/// True if a point follows the point before it, of which the `rounds` are given.
+fn follows(points: &[Point], i: usize, k: usize, rounds: &[u8]) -> bool {
+    if i.is_multiple_of(2) || rounds[i - 1] < 2 {
+        return false;
+    }
+    let around = around(points, i - 1, &vec![false; points.len()]);
+    let reach2 = last2(points, i - 1, nearest(&around, 2 * k));
+    4 * distance2(points[i], points[i - 1]) <= reach2
+        && !has_layers(points, i - 1, &around, (2 * k, k), 2)
 }
 
 /// The shape of a cloud.
@@ -126,7 +168,13 @@ pub fn relax(points: &[Point], settings: &Settings) -> Relaxed {
     let is_in_noise = |i: usize| run(i).any(|level| *level > 0);
     let own = |i: usize| rounds(points, &levels, i, k).min(most);
     let all = (0..points.len()).map(|i| if is_in_noise(i) { own(i) } else { 0 });
-    let all: Vec<u8> = all.collect();
+    let mut all: Vec<u8> = all.collect();
+    let follows: Vec<bool> = { 0..points.len() }
+        .map(|i| follows(points, i, k, &all))
+        .collect();
+    for i in (0..points.len()).filter(|i| follows[*i]) {
+        all[i] = all[i - 1];
+    }
     relaxed.moved = all.iter().filter(|rounds| **rounds > 0).count();
     relaxed.kept = levels
         .iter()
@@ -135,10 +183,17 @@ pub fn relax(points: &[Point], settings: &Settings) -> Relaxed {
         .count();
     relaxed.noise = levels;
     relaxed.rounds = u32::from(all.iter().copied().max().unwrap_or(0));
+    let none = vec![false; points.len()];
     for round in 1..=most {
         let before = relaxed.shape.clone();
-        for i in (0..points.len()).filter(|&i| all[i] >= round) {
-            relaxed.shape[i] = moved(&before, i, k, all[i]);
+        let moves = |i: &usize| all[*i] == round || all[*i] > round && !follows[*i];
+        for i in (0..points.len()).filter(moves) {
+            let is_first = round == 1;
+            let left_out = if is_first { &none } else { &follows };
+            let run = left_out[i - i % RUN..].iter().take(RUN);
+            let count = 2 * k * (RUN - run.filter(|follows| **follows).count()) / RUN;
+            let around = around(&before, i, left_out);
+            relaxed.shape[i] = moved(&before, i, &around, (count, k), all[i]);
         }
     }
     relaxed

@@ -181,7 +181,29 @@ pub fn near_in_store(
     point: Point,
     count: usize,
 ) -> Result<Neighbors> {
-    let mut source = (Walk::new(store, cache, id, point), Neighbors::default());
-    source.reach(count)?;
-    Ok(source.1)
+    some_near_in_store(store, cache, (id, point), |_| true, count)
+}
+
+/// The `count` nearest neighbours of a point whose ids are `wanted`, or all of these if there are fewer, from the
+/// whole store.
+///
+/// # Errors
+/// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
+pub(super) fn some_near_in_store(
+    store: &PointStore,
+    cache: &mut PageCache,
+    (id, point): (Id, Point),
+    wanted: impl Fn(usize) -> bool,
+    count: usize,
+) -> Result<Neighbors> {
+    let mut walk = Walk::new(store, cache, id, point);
+    let mut near = Neighbors::default();
+    while near.len() < count
+        && let Some(next) = walk.advance()?
+    {
+        if wanted(next.id.index()) {
+            near.push(next);
+        }
+    }
+    Ok(near)
 }

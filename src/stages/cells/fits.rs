@@ -1,6 +1,6 @@
 //! The planes and neighbours of the points of a tile, for stages other than this one.
 
-use super::fit::{Fit, Widen, fit_in_store, fit_in_tile, near_in_store};
+use super::fit::{Fit, Widen, fit_in_store, fit_in_tile, near_in_store, some_near_in_store};
 use crate::ids::Id;
 use crate::order::PointStore;
 use crate::tiles::Tile;
@@ -193,8 +193,20 @@ pub fn each_neighborhood<T>(
     Planes::load(unit, store, ids, all, count)?.each_neighborhood(all, of, each)
 }
 
-/// Calls `each` with every point of a tile whose id is `wanted`, and its `count` nearest neighbours, or all
-/// points if there are fewer, in order of id. `each` may swap them for others.
+/// Which points of a tile are looked at, and what their neighbours are.
+pub(crate) struct Among<'a> {
+    /// True for the points that are looked at, by their ids.
+    pub wanted: &'a dyn Fn(usize) -> bool,
+    /// The number of their neighbours.
+    pub count: &'a dyn Fn(usize) -> usize,
+    /// The largest of these numbers.
+    pub most: usize,
+    /// True for the points that can be neighbours, by their ids; `None` if all can.
+    pub chosen: Option<&'a dyn Fn(usize) -> bool>,
+}
+
+/// Calls `each` with every point of a tile that is looked at, and its nearest neighbours, or all if there are fewer, in
+/// order of id. A point that cannot be a neighbour has one more and is not among them. `each` may swap them for others.
 ///
 /// # Errors
 /// [`outcrop_disk::error::Error::Io`], [`outcrop_disk::error::Error::Corrupt`].
@@ -202,25 +214,30 @@ pub(crate) fn each_around(
     unit: &Unit<'_>,
     store: &PointStore,
     ids: Range<usize>,
-    count: usize,
-    wanted: impl Fn(usize) -> bool,
+    among: &Among<'_>,
     each: impl FnMut(usize, Point, &mut Around),
 ) -> Result<()> {
-    let planes = Planes::load(unit, store, ids, &wanted, count)?;
+    let mut tile = Tile::load_some(store, ids, among.wanted)?;
+    if let Some(chosen) = among.chosen {
+        tile.choose(chosen);
+    }
+    unit.give_back(tile.spare());
+    let _held = unit.hold(tile.bytes());
     let each = RefCell::new(each);
     let in_tile = |(search, grown): Watched<'_, '_>, found: &mut Found<'_, ()>| {
         let look = |id: Id, point: Point, around: Option<&mut Around>| {
             let known = around.map(|around| (each.borrow_mut())(id.index(), point, around));
             found(id, point, Ok(known.as_ref()));
         };
-        planes
-            .tile
-            .for_some_around(count, search, &wanted, grown, look);
+        tile.for_some_around((among.most, among.count), search, among.wanted, grown, look);
     };
     let mut around = Around::default();
     let in_store = |cache: &mut PageCache, id: Id, point: Point| {
-        let near = near_in_store(store, cache, id, point, count)?;
-        around.set(&near, count, id);
+        let is_chosen = |id: usize| among.chosen.is_none_or(|chosen| chosen(id));
+        let count = (among.count)(id.index());
+        let own = is_chosen(id.index()).then_some(id);
+        let near = some_near_in_store(store, cache, (id, point), is_chosen, count + 1)?;
+        around.set(&near, count, own);
         (each.borrow_mut())(id.index(), point, &mut around);
         Ok(Some(()))
     };

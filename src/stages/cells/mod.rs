@@ -10,7 +10,7 @@ mod together;
 pub use cell::{CellMaker, DiskRadius, Outcome};
 pub use directions::{DiskStats, InputDirections};
 pub use fit::{Fit, Widen, fit_in_tile};
-pub(crate) use fits::{Planes, each_around};
+pub(crate) use fits::{Among, Planes, each_around};
 pub use fits::{each_neighborhood, each_plane};
 
 use crate::blocks::Blocks;

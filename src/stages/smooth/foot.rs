@@ -33,9 +33,9 @@ pub(super) struct Foot {
 
 /// Receives the feet of points.
 pub(super) trait Settle<T> {
-    /// True if a point, with this weighted mean of the squared heights of its neighbours over the surface of
-    /// second order, is to be settled without its foot.
-    fn is_layered(&self, _point: &T, _mean2: f64) -> bool {
+    /// Receives the weighted mean of the squared heights of a point's neighbours over the surface of second order, in
+    /// squared steps; true if the point is to be settled without its foot.
+    fn look(&mut self, _point: &T, _mean2: f64) -> bool {
         false
     }
 
@@ -109,7 +109,7 @@ impl<T: Copy> Feet<T> {
         let mut layered = [false; LANES];
         for (lane, layered) in layered.iter_mut().enumerate() {
             let mean2 = fit.mean2(lane) * (self.reach[lane] * self.reach[lane]);
-            *layered = lanes[lane] && to.is_layered(&self.points[lane], mean2);
+            *layered = lanes[lane] && to.look(&self.points[lane], mean2);
             lanes[lane] &= !*layered;
         }
         let beside = self.beside_edges(&lanes);

@@ -3,9 +3,12 @@
 //!
 //! Ids are kept; only positions and bounding boxes change.
 
+mod first;
 mod fit;
+mod followers;
 mod foot;
 mod level;
+mod mover;
 mod moves;
 mod noise;
 mod pass;
@@ -16,7 +19,7 @@ mod tests;
 pub use level::Gauge;
 pub use relax::{RelaxStats, Relaxed, relax};
 
-use crate::cells::{Fit, TileRanges, Widen, each_around, each_plane};
+use crate::cells::{Among, Fit, TileRanges, Widen, each_around, each_plane};
 use crate::order::{PointStore, StoredPoints};
 use foot::{Feet, Foot};
 use outcrop_disk::error::Result;
@@ -62,6 +65,24 @@ pub struct Relaxing {
     pub step: f64,
 }
 
+impl Relaxing {
+    /// The number of neighbours by which a point moves.
+    fn most(&self) -> usize {
+        self.neighbors * METHOD.smoothing.neighbors
+    }
+
+    /// The number of neighbours in layers: those of a plane, but enough for a surface of second order.
+    fn fewer(&self) -> usize {
+        self.neighbors.max(METHOD.plane.neighbors)
+    }
+}
+
+/// The ids of the run of a point, before `end`.
+fn run_of(id: usize, end: usize) -> Range<usize> {
+    let first = id - id % METHOD.curve.run;
+    first..(first + METHOD.curve.run).min(end)
+}
+
 /// One round of smoothing: every point moves to the plane of its `neighbors` nearest, or, with
 /// [`Smoothing::Edges`], to a surface through twice as many neighbours.
 ///
@@ -93,16 +114,15 @@ pub fn smooth(
             let mut put = |(id, point): (usize, Point), foot: Foot| {
                 points[id - ids.start] = moved(point, foot.offset);
             };
-            each_around(
-                unit,
-                store,
-                ids.clone(),
-                count,
-                |_| true,
-                |id, point, around| {
-                    feet.add((id, point), around, &mut put);
-                },
-            )?;
+            let among = Among {
+                wanted: &|_| true,
+                count: &|_| count,
+                most: count,
+                chosen: None,
+            };
+            each_around(unit, store, ids.clone(), &among, |id, point, around| {
+                feet.add((id, point), around, &mut put);
+            })?;
             feet.finish(&mut put);
             Ok(())
         }

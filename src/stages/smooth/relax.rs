@@ -4,16 +4,17 @@
 //! Restricted Voronoi cells disagree where points lie off the surface by a part of their spacing (scale space;
 //! Digne et al., *Scale space meshing of raw data point sets*, Computer Graphics Forum 30, 2011).
 
-use super::foot::{Feet, Foot, Settle};
+use super::first::{Decided, FirstRound};
+use super::foot::Feet;
+use super::mover::{Mover, Noisy};
 use super::moves::{Counts, Moves};
 use super::noise::{Found, look};
 use super::pass::Pass;
-use super::{Relaxing, moved};
-use crate::cells::{TileRanges, each_around};
-use crate::levels::{HIGHEST, Levels};
+use super::{Relaxing, run_of};
+use crate::cells::{Among, TileRanges, each_around};
+use crate::levels::Levels;
 use crate::order::{PointStore, StoredPoints};
-use crate::spacing::{StoredSpacings, spacing2};
-use crate::tiles::near::{Around, Nearer};
+use crate::spacing::StoredSpacings;
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_geom::Point;
@@ -49,115 +50,13 @@ pub struct RelaxStats {
     pub largest: f64,
 }
 
-/// The number of rounds in which a point with these neighbours moves, itself included: the highest level that
-/// more than nine tenths of them reach.
-fn rounds(levels: &Levels, around: &Around) -> u8 {
-    // 16 bits for each level: no addition waits for one in memory.
-    let mut counts = 0u64;
-    for id in around.ids() {
-        counts += 1 << (16 * levels.get(*id as usize));
-    }
-    let (mut below, mut rounds) = (0, 0);
-    for level in 1..=HIGHEST {
-        below += (counts >> (16 * (level - 1)) & 0xffff) as usize;
-        if METHOD.noise.few * below >= around.count() {
-            break;
-        }
-        rounds = level;
-    }
-    rounds
-}
-
-/// A noisy point.
-#[derive(Debug, Clone, Copy, Default)]
-struct Noisy {
-    id: usize,
-    point: Point,
-    /// Number of rounds in which it moves.
-    rounds: u8,
-    /// Squared distance of the last of its neighbours.
-    reach2: u64,
-}
-
-impl Noisy {
-    fn new((id, point): (usize, Point), rounds: u8, around: &Around) -> Self {
-        Self {
-            id,
-            point,
-            rounds,
-            reach2: around.last2(),
-        }
-    }
-
-    /// The position to which it moves. An outlier, which is too far from the surface, stays.
-    fn moved(&self, Foot { offset }: Foot) -> Point {
-        let limit = METHOD.smoothing.farthest;
-        let length2 = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2];
-        if length2 > limit * limit * self.reach2 as f64 {
-            self.point
-        } else {
-            moved(self.point, offset)
-        }
-    }
-
-    /// True if `count` neighbours are farther from their surface than noise explains: there are layers, such
-    /// as the two sides of a thin plate, or details.
-    fn has_layers(&self, mean2: f64, count: usize) -> bool {
-        let limit = METHOD.noise.layers * f64::from(self.rounds);
-        mean2 > limit * limit * spacing2(self.reach2, count)
-    }
-}
-
-/// Moves noisy points to their feet, those whose neighbours lie in layers by fewer neighbours.
-struct Mover<P> {
-    /// The numbers of neighbours, and of those in layers.
-    count: usize,
-    fewer: usize,
-    layered: Feet<Noisy>,
-    nearer: Nearer,
-    /// Receives the noisy points and the positions to which they move.
-    put: P,
-}
-
-impl<P: FnMut(Noisy, Point)> Mover<P> {
-    /// Moves the points in layers that are left.
-    fn finish(&mut self) {
-        let put = &mut self.put;
-        self.layered
-            .finish(&mut |noisy: Noisy, foot: Foot| put(noisy, noisy.moved(foot)));
-    }
-}
-
-impl<P: FnMut(Noisy, Point)> Settle<Noisy> for Mover<P> {
-    fn is_layered(&self, noisy: &Noisy, mean2: f64) -> bool {
-        self.fewer < self.count && noisy.has_layers(mean2, self.count)
-    }
-
-    fn settle_layered(&mut self, noisy: Noisy, around: &mut Around) {
-        around.keep_nearest(self.fewer, &mut self.nearer);
-        let reach2 = around.last2();
-        let put = &mut self.put;
-        self.layered.add(
-            Noisy { reach2, ..noisy },
-            around,
-            &mut |noisy: Noisy, foot: Foot| {
-                put(noisy, noisy.moved(foot));
-            },
-        );
-    }
-
-    fn settle(&mut self, noisy: Noisy, foot: Foot) {
-        (self.put)(noisy, noisy.moved(foot));
-    }
-}
-
 /// The result of a round for some points.
 #[derive(Serialize, Deserialize)]
 struct Done {
     /// The first of the points.
     first: usize,
-    /// For each of them, the number of rounds in which it moves; empty after the first round.
-    rounds: Levels,
+    /// What the first round decides about them; empty after the first round.
+    decided: Decided,
     moves: Moves,
 }
 
@@ -167,25 +66,15 @@ struct Round<'a> {
     relaxing: Relaxing,
     /// The positions before the first round.
     original: &'a PointStore,
-    /// In the first round the levels of noise, then the number of rounds in which each point moves.
+    /// The levels of noise.
     levels: &'a Levels,
+    /// What the first round decided about all points.
+    decided: &'a Decided,
 }
 
 impl Round<'_> {
     fn is_first(&self) -> bool {
         self.number == 1
-    }
-
-    /// True if a point of the run of `id` has a level of noise; the points of other runs stay.
-    fn is_in_noise(&self, id: usize) -> bool {
-        let first = id - id % METHOD.curve.run;
-        let last = (first + METHOD.curve.run).min(self.original.len());
-        self.levels.any(&(first..last))
-    }
-
-    /// The number of neighbours in layers: those of a plane, but enough for a surface of second order.
-    fn fewer(&self) -> usize {
-        self.relaxing.neighbors.max(METHOD.plane.neighbors)
     }
 
     /// Moves the noisy ones of the points `ids`.
@@ -198,7 +87,7 @@ impl Round<'_> {
     ) -> Result<Done> {
         let mut done = Done {
             first: ids.start,
-            rounds: Levels::new(if self.is_first() { ids.len() } else { 0 }),
+            decided: Decided::new(if self.is_first() { ids.len() } else { 0 }),
             moves: Moves::default(),
         };
         // No run has a level, so all points stay.
@@ -209,56 +98,68 @@ impl Round<'_> {
         let mut counts = Counts::default();
         let put = |noisy: Noisy, to: Point| {
             points[noisy.id - ids.start] = to;
-            let last = u32::from(noisy.rounds) == self.number;
-            counts.note(last, original[noisy.id - ids.start], to);
+            counts.note(noisy.last, original[noisy.id - ids.start], to);
         };
-        self.move_noisy(unit, store, ids.clone(), &mut done.rounds, put)?;
+        if self.is_first() {
+            let first = FirstRound {
+                unit,
+                store,
+                relaxing: self.relaxing,
+                levels: self.levels,
+                ids: ids.clone(),
+                points: &original,
+            };
+            done.decided = first.advance(put)?;
+        } else {
+            self.advance_again(unit, store, ids.clone(), put)?;
+        }
         done.moves = counts.moves();
         Ok(done)
     }
 
-    /// Calls `put` with the noisy points and the positions to which they move; sets the `rounds` in which
-    /// points move, if this is the first.
-    fn move_noisy(
+    /// A round after the first: moves the points whose rounds are not over, followers in their last round only.
+    /// Followers are neighbours of no point.
+    fn advance_again(
         &self,
         unit: &Unit<'_>,
         store: &PointStore,
         ids: Range<usize>,
-        to: &mut Levels,
         put: impl FnMut(Noisy, Point),
     ) -> Result<()> {
-        let most = self.relaxing.rounds.min(u32::from(HIGHEST)) as u8;
-        let count = self.relaxing.neighbors * METHOD.smoothing.neighbors;
-        let mut feet = Feet::default();
-        let mut mover = Mover {
-            count,
-            fewer: self.fewer(),
-            layered: Feet::default(),
-            nearer: Nearer::default(),
-            put,
-        };
-        let first = ids.start;
+        let Decided { rounds, followers } = self.decided;
+        let most = self.relaxing.most();
         let wanted = |id: usize| {
-            if self.is_first() {
-                self.is_in_noise(id)
-            } else {
-                u32::from(self.levels.get(id)) >= self.number
-            }
+            let rounds = u32::from(rounds.get(id));
+            rounds == self.number || rounds > self.number && !followers.contains(id)
         };
-        each_around(unit, store, ids, count, wanted, |id, point, around| {
-            let rounds = if self.is_first() {
-                let rounds = rounds(self.levels, around).min(most);
-                to.set(id - first, rounds);
-                rounds
-            } else {
-                self.levels.get(id)
+        // The others reach as far as all points do by the number of the first round.
+        let count = |id: usize| {
+            let run = run_of(id, self.original.len());
+            let others = METHOD.curve.run - run.filter(|id| followers.contains(*id)).count();
+            most * others / METHOD.curve.run
+        };
+        let among = Among {
+            wanted: &wanted,
+            count: &count,
+            most,
+            chosen: Some(&|id| !followers.contains(id)),
+        };
+        let mut feet = Feet::default();
+        let mut mover = Mover::new(self.relaxing, put);
+        each_around(unit, store, ids, &among, |id, point, around| {
+            let rounds = rounds.get(id);
+            let noisy = Noisy {
+                id,
+                point,
+                rounds,
+                last: u32::from(rounds) == self.number,
+                leads: false,
+                count: count(id),
+                reach2: around.last2(),
             };
-            if rounds > 0 {
-                feet.add(Noisy::new((id, point), rounds, around), around, &mut mover);
-            }
+            feet.add(noisy, around, &mut mover);
         })?;
-        feet.finish(&mut mover);
-        mover.finish();
+        mover.finish(&mut feet);
         Ok(())
     }
 }
@@ -291,26 +192,26 @@ pub fn relax(
     };
     let mut passes = 0;
     if noisy {
+        let bytes = Decided::size(store.len());
         let _rounds_held = workspace.reserve("rounds of smoothing", bytes)?;
-        passes = all_rounds(store, tiles, relaxing, levels, &mut relaxed, workspace)?;
+        passes = all_rounds(store, tiles, relaxing, &levels, &mut relaxed, workspace)?;
+        relaxed.noise = levels;
     }
     let left = u64::from(relaxing.rounds - passes) * store.len() as u64;
     workspace.observer.advance(left);
     Ok(relaxed)
 }
 
-/// Smooths noisy points, whose `levels` of noise become those of `relaxed`, until no point moves. Returns the number
-/// of passes over all points.
+/// Smooths noisy points until no point moves. Returns the number of passes over all points.
 fn all_rounds(
     store: &PointStore,
     tiles: TileRanges,
     relaxing: Relaxing,
-    mut levels: Levels,
+    levels: &Levels,
     relaxed: &mut Relaxed,
     workspace: &Workspace,
 ) -> Result<u32> {
-    // The levels of noise after the first round, which counts the rounds by them.
-    let mut other = Levels::new(store.len());
+    let mut decided = Decided::default();
     let mut moves = Moves::default();
     let (mut passes, mut rounds) = (0, 0);
     while passes < relaxing.rounds {
@@ -319,15 +220,16 @@ fn all_rounds(
             number: passes,
             relaxing,
             original: store,
-            levels: &levels,
+            levels,
+            decided: &decided,
         };
         let before = relaxed.store.as_ref();
         let before = before.map(|store| store.open(workspace)).transpose()?;
         let current = before.as_ref().unwrap_or(store);
-        let (next, done) = one_round(current, tiles, &round, &mut other, workspace)?;
+        let (next, done, first) = one_round(current, tiles, &round, workspace)?;
         drop(before);
         if passes == 1 {
-            std::mem::swap(&mut levels, &mut other);
+            decided = first;
         }
         if done.moved() == 0 {
             next.release(workspace)?;
@@ -339,28 +241,36 @@ fn all_rounds(
             old.release(workspace)?;
         }
     }
-    relaxed.noise = other;
     relaxed.stats = moves.stats(rounds, relaxing.step);
     Ok(passes)
 }
 
-/// Moves the points of one round; returns the new positions and what moved.
+/// Moves the points of one round; returns the new positions, what moved, and what the first round decides.
 fn one_round(
     store: &PointStore,
     tiles: TileRanges,
     round: &Round<'_>,
-    rounds: &mut Levels,
     workspace: &Workspace,
-) -> Result<(StoredPoints, Moves)> {
+) -> Result<(StoredPoints, Moves, Decided)> {
     let file = format!("relaxed{}", round.number);
-    let pass = Pass::new(&file, "relax: tile", tiles);
+    let pass = Pass {
+        bytes: if round.is_first() {
+            FirstRound::BYTES
+        } else {
+            0
+        },
+        ..Pass::new(&file, "relax: tile", tiles)
+    };
     let work = |unit: &Unit<'_>, ids: Range<usize>, points: &mut [Point]| {
         round.advance(unit, store, ids, points)
     };
     let mut moves = Moves::default();
+    let mut decided = Decided::new(if round.is_first() { store.len() } else { 0 });
     let next = pass.over(store, workspace, work, |done: Done| {
-        rounds.put(done.first, &done.rounds);
+        if round.is_first() {
+            decided.put(done.first, &done.decided);
+        }
         moves.add(&done.moves);
     })?;
-    Ok((next, moves))
+    Ok((next, moves, decided))
 }

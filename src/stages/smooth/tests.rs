@@ -146,7 +146,8 @@ fn only_noisy_points_move_and_tiles_do_not_matter() {
     assert!(expected.iter().all(|p| p[0] >= 2500 || p[2] == 500));
 }
 
-/// Some points have no noise, but noisy neighbours; they are a tile of their own, or not.
+/// Some points have no noise, but noisy neighbours; they are a tile of their own, or not. Points that others may follow
+/// come late where the tile does not know their neighbours.
 #[test]
 fn points_without_noise_among_noisy_ones_stay_whatever_the_tiles() {
     // Reaches differ, so that some neighbours are not in the tile.

@@ -212,7 +212,12 @@ fn pick_leaves_body<P: Pick>(
             let mut distances = [0.0; BLOCK];
             let [x, y, z] = columns;
             point_box_body([x, y, z], around.min, around.max, &mut distances);
-            let within = P::within(&distances, around.limit) & first_bits(range.end - start);
+            let some = tile
+                .chosen
+                .as_ref()
+                .map_or(u32::MAX, |chosen| chosen.block(start));
+            let some = some & first_bits(range.end - start);
+            let within = P::within(&distances, around.limit) & some;
             let mut ids = [first + (start - range.start) as u32; BLOCK];
             (0..).zip(&mut ids).for_each(|(n, id)| *id += n);
             P::pack_at(bytemuck::cast_ref(x), within, to_x, count);

@@ -5,6 +5,7 @@
 //! beyond the reach is answered from the whole store ([`walk::Walk`]).
 
 mod candidates;
+mod chosen;
 mod halo;
 pub mod near;
 pub mod neighbors;
@@ -14,6 +15,7 @@ pub mod wanted;
 
 use crate::ids::{Id, PageNumber};
 use crate::order::PointStore;
+use chosen::Chosen;
 use halo::{Reach, halo};
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::memory::bytes_of;
@@ -68,6 +70,8 @@ pub struct Tile {
     leaf_boxes: Boxes,
     own: Vec<OwnPage>,
     near: Vec<u32>,
+    /// The points that can be neighbours; `None` if all can.
+    chosen: Option<Chosen>,
 }
 
 impl Tile {
@@ -122,9 +126,23 @@ impl Tile {
             leaf_boxes: Boxes::default(),
             own: Vec::new(),
             near: Vec::new(),
+            chosen: None,
         };
         tile.index(reaches);
         Ok(tile)
+    }
+
+    /// From now on, only points whose ids are `chosen` can be neighbours; others can still be queried.
+    pub fn choose(&mut self, chosen: impl Fn(usize) -> bool) {
+        let page = self.page;
+        let pages = (self.pages.iter()).flat_map(|number| number * page..(number + 1) * page);
+        let ids = pages.take(self.points.len());
+        self.chosen = Some(Chosen::of(ids.map(chosen)));
+    }
+
+    /// True if point `index` can be a neighbour.
+    fn is_chosen(&self, index: usize) -> bool {
+        self.chosen.as_ref().is_none_or(|chosen| chosen.get(index))
     }
 
     /// Bytes of [`Tile::estimate`] that neither the tile nor a search in it takes.
@@ -140,7 +158,8 @@ impl Tile {
     #[must_use]
     pub fn bytes(&self) -> u64 {
         let lists = bytes_of(&self.pages) + self.points.bytes() + bytes_of(&self.page_boxes);
-        lists + self.leaf_boxes.bytes() + bytes_of(&self.own) + bytes_of(&self.near)
+        let chosen = self.chosen.as_ref().map_or(0, Chosen::bytes);
+        lists + self.leaf_boxes.bytes() + bytes_of(&self.own) + bytes_of(&self.near) + chosen
     }
 
     fn index(&mut self, reaches: Vec<Reach>) {

@@ -57,7 +57,7 @@ pub struct Search {
     near: Neighbors,
     /// Approximate squared distance of the last neighbour in the previous query, if that query was a sum.
     last: f32,
-    /// The same for queries with a widened number of neighbours, by this number.
+    /// The same for queries whose number of neighbours differs, by this number.
     lasts: Vec<(usize, f32)>,
     /// Number of neighbours, and squared distance of the last, in the previous query that was widened.
     widened: (usize, u64),
@@ -250,19 +250,19 @@ impl Tile {
     /// An upper bound on the squared distance of the `k`th neighbour for each point of a group, from the
     /// points next to it in curve order; `u64::MAX` if there are too few.
     fn limit(&self, group: Range<usize>, k: usize, search: &mut Search) -> u64 {
-        let side = (k + 1).max(32);
+        // Half of the points may not be neighbours.
+        let times = if self.chosen.is_some() { 2 } else { 1 };
+        let side = (times * (k + 1)).max(32);
         let around = group.start.saturating_sub(side)..(group.end + side).min(self.points.len());
-        if around.len() <= k {
-            return u64::MAX;
-        }
         let window = &mut search.window;
-        let columns = self.points.coordinates();
         let limit = |index: usize| {
             let point = self.points.get(index);
-            let [x, y, z] = columns.map(|column| &column[around.clone()]);
-            let near = x.iter().zip(y).zip(z);
+            let near = around.clone().filter(|other| self.is_chosen(*other));
             window.clear();
-            window.extend(near.map(|((x, y), z)| distance2([*x, *y, *z], point)));
+            window.extend(near.map(|other| distance2(self.points.get(other), point)));
+            if window.len() <= k {
+                return u64::MAX;
+            }
             // The point itself is included, at distance 0.
             *window.select_nth_unstable(k).1
         };
@@ -329,6 +329,19 @@ impl Search {
     fn note_wider(&mut self, count: usize, last2: u64) {
         self.widened = (count, last2 + last2 / 4);
         self.wider2 = self.wider2.max(self.widened.1);
+    }
+
+    /// Runs a query for `count` neighbours, which begins with the last neighbour of the previous query for as many.
+    fn with_last<T>(&mut self, count: usize, query: impl FnOnce(&mut Self) -> T) -> T {
+        let place = self.lasts.iter().position(|(k, _)| *k == count);
+        let place = place.unwrap_or_else(|| {
+            self.lasts.push((count, 0.0));
+            self.lasts.len() - 1
+        });
+        std::mem::swap(&mut self.last, &mut self.lasts[place].1);
+        let result = query(self);
+        std::mem::swap(&mut self.last, &mut self.lasts[place].1);
+        result
     }
 
     fn swap_back(&mut self) {

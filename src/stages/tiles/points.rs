@@ -68,13 +68,6 @@ impl Points {
         Aabb { min, max }
     }
 
-    /// The coordinates of the points in `range`.
-    #[inline(always)]
-    pub fn coordinates(&self) -> [&[i32]; 3] {
-        let [x, y, z] = self.columns();
-        [&x[..self.len], &y[..self.len], &z[..self.len]]
-    }
-
     /// The coordinates of a block of points; those after the last point are undefined.
     #[inline(always)]
     pub fn block(&self, start: usize) -> Option<[&[i32; BLOCK]; 3]> {

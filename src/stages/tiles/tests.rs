@@ -239,7 +239,39 @@ fn check_around(points: &[Point], tile: &Tile, k: usize, level: Level) {
         }
     };
     let wanted = |id: usize| !id.is_multiple_of(3);
-    tile.for_some_around(k, &mut Search::at(level), wanted, |_| (), each);
+    tile.for_some_around((k, |_| k), &mut Search::at(level), wanted, |_| (), each);
+}
+
+/// Compares different numbers of neighbours around all points, where only some can be neighbours, with those of a sorted list.
+fn check_chosen(points: &[Point], mut tile: Tile, k: usize, level: Level) {
+    let chosen = |id: usize| !(id / 2).is_multiple_of(3) || id.is_multiple_of(5);
+    tile.choose(chosen);
+    let count = |id: usize| {
+        if id.is_multiple_of(7) {
+            k.div_ceil(2)
+        } else {
+            k
+        }
+    };
+    let each = |id: Id, point: Point, around: Option<&mut Around>| {
+        let Some(around) = around else { return };
+        let near = all_near(points, id.index()).into_iter();
+        let mut all: Vec<_> = near.filter(|near| chosen(near.1.index())).collect();
+        if chosen(id.index()) {
+            all.insert(0, (0, id));
+        }
+        let k = count(id.index());
+        all.truncate(k + 1);
+        assert_eq!(around.last2(), all[k].0);
+        all.sort_unstable_by_key(|near| near.1);
+        let columns = around.columns();
+        assert_eq!(around.count(), all.len());
+        for (place, (_, id)) in all.iter().enumerate() {
+            let difference = columns.map(|column| i64::from(column[place]));
+            assert_eq!(difference, outcrop_geom::sub(points[id.index()], point));
+        }
+    };
+    tile.for_some_around((k, count), &mut Search::at(level), |_| true, |_| (), each);
 }
 
 /// Without ties, nearly all neighbourhoods are known, also where the density changes.
@@ -288,6 +320,7 @@ proptest! {
                 check_groups(&points, &tile, k, &mut Search::at(level));
                 check_around(&points, &tile, k, level);
             }
+            check_chosen(&points, tile, k, Level::best());
         }
     }
 }

@@ -3,8 +3,8 @@
 use super::sums::{Unknown, divide_body, divided_body, padded};
 use super::{OwnPage, Search, above};
 use crate::ids::Id;
-use crate::tiles::Tile;
 use crate::tiles::neighbors::Neighbors;
+use crate::tiles::{Near, Tile};
 use outcrop_geom::kernels::{BLOCK, Level, Pick, distances_body, kernel};
 use outcrop_geom::{Point, distance2};
 
@@ -66,28 +66,25 @@ impl Around {
         &self.ids[..self.count]
     }
 
-    /// Takes the first `count` of `near`, or all if there are fewer, and point `id` itself.
-    pub fn set(&mut self, near: &Neighbors, count: usize, id: Id) {
+    /// Takes the first `count` of `near`, or all if there are fewer, and the point itself with its id; without an
+    /// id one more of them instead.
+    pub fn set(&mut self, near: &Neighbors, count: usize, own: Option<Id>) {
+        let count = count + usize::from(own.is_none());
         let mut all: Vec<_> = near.iter().take(count).collect();
         self.last2 = all.last().map_or(0, |near| near.distance2);
+        all.extend(own.map(|id| Near {
+            distance2: 0,
+            id,
+            difference: [0; 3],
+        }));
         all.sort_unstable_by_key(|near| near.id);
-        let before = all.partition_point(|near| near.id < id);
-        let mut differences: Vec<_> = all.iter().map(|near| near.difference).collect();
-        differences.insert(before, [0; 3]);
-        self.reserve(differences.len());
-        self.count = differences.len();
-        let ids = all.iter().map(|near| near.id.get());
-        for (to, other) in self.ids.iter_mut().zip(ids.clone().take(before)) {
-            *to = other;
-        }
-        self.ids[before] = id.get();
-        for (to, other) in self.ids[before + 1..].iter_mut().zip(ids.skip(before)) {
-            *to = other;
-        }
-        for (axis, column) in self.columns.iter_mut().enumerate() {
-            for (to, difference) in column.iter_mut().zip(&differences) {
+        self.reserve(all.len());
+        self.count = all.len();
+        for (place, near) in all.into_iter().enumerate() {
+            self.ids[place] = near.id.get();
+            for (column, difference) in self.columns.iter_mut().zip(near.difference) {
                 // Differences of coordinates in 0..2^30 fit 32 bits.
-                *to = difference[axis] as i32 as u32;
+                column[place] = difference as i32 as u32;
             }
         }
         self.end();
@@ -147,19 +144,23 @@ impl Around {
 }
 
 impl Tile {
-    /// Calls `each` with every point whose id is `wanted` and its `k` nearest neighbours, in order of id; with
-    /// `None` if the halo cannot certify these neighbours. `each` may swap them for others.
+    /// Calls `each` with every point whose id is `wanted`, in order of id, and its `count` nearest neighbours, at most
+    /// `most`; with `None` if the halo cannot certify these neighbours. A point that cannot be a neighbour has one more
+    /// neighbour and is not among them. `each` may swap the neighbours for others.
     pub fn for_some_around(
         &self,
-        k: usize,
+        (most, count): (usize, impl Fn(usize) -> usize),
         search: &mut Search,
         wanted: impl Fn(usize) -> bool,
         grown: impl FnMut(u64),
         mut each: impl FnMut(Id, Point, Option<&mut Around>),
     ) {
         let mut around = Around::default();
-        self.for_groups(k, search, wanted, grown, |own, index, id, search| {
-            let known = self.around(own, index, id, k, search, &mut around);
+        self.for_groups(most, search, wanted, grown, |own, index, id, search| {
+            let k = count(id.index());
+            let known = search.with_last(k, |search| {
+                self.around(own, index, id, k, search, &mut around)
+            });
             let last2 = if known { around.last2() } else { 0 };
             each(id, self.points.get(index), known.then_some(&mut around));
             last2
@@ -185,9 +186,11 @@ impl Tile {
             Ok(()) => true,
             Err(Unknown::Few) => false,
             Err(Unknown::Close) => {
-                let known = self.nearest(own, index, id, k, search).is_some();
+                let among = self.is_chosen(index);
+                let count = if among { k } else { k + 1 };
+                let known = self.nearest(own, index, id, count, search).is_some();
                 if known {
-                    around.set(&search.near, k, id);
+                    around.set(&search.near, k, among.then_some(id));
                 }
                 known
             }

@@ -87,18 +87,13 @@ impl Query<'_> {
     pub fn sums(&mut self, count: usize) -> Option<Sums> {
         let mut sums = Sums::default();
         loop {
-            let search = &mut *self.search;
-            let before = search.lasts.iter().position(|(k, _)| *k == count);
-            let before = before.unwrap_or_else(|| {
-                search.lasts.push((count, 0.0));
-                search.lasts.len() - 1
+            let point = self.point;
+            let summed = self.search.with_last(count, |search| {
+                sum_nearest(search.level, search, point, count, &mut sums)
             });
-            std::mem::swap(&mut search.last, &mut search.lasts[before].1);
-            let summed = sum_nearest(search.level, search, self.point, count, &mut sums);
-            std::mem::swap(&mut search.last, &mut search.lasts[before].1);
             match summed {
                 Ok(()) => {
-                    search.note_wider(count, sums.last2);
+                    self.search.note_wider(count, sums.last2);
                     return Some(sums);
                 }
                 Err(Unknown::Few) => {
