@@ -11,7 +11,7 @@ const VERSION: u64 = 3;
 const MESHES: [(&str, u32); 8] = [
     ("clean, robust", 2_364_131_790),
     ("clean, paper", 2_771_001_501),
-    ("noisy, robust", 1_212_967_337),
+    ("noisy, robust", 169_893_712),
     ("noisy, paper", 1_777_962_663),
     ("noisy, smooth", 2_552_388_948),
     ("scan lines, robust", 3_568_111_642),

@@ -92,19 +92,18 @@ fn last2(points: &[Point], i: usize, around: &[usize]) -> u64 {
 }
 
 /// True if the mean squared height of the `count` nearest over their surface, which reach as far as `2 k` of all points,
-/// is more than noise that asks for so many rounds explains.
-fn has_layers(
+/// is more than that of `limit` spacings.
+fn is_over(
     points: &[Point],
     i: usize,
     around: &[usize],
     (count, k): (usize, usize),
-    rounds: u8,
+    limit: f64,
 ) -> bool {
     let around = nearest(around, count);
     let Some((_, mean2)) = offset_from(points, i, around) else {
         return false;
     };
-    let limit = 0.4 * f64::from(rounds);
     let spacing2 = std::f64::consts::PI * last2(points, i, around) as f64 / (2 * k) as f64;
     mean2 > limit * limit * spacing2
 }
@@ -119,7 +118,8 @@ fn moved(
     rounds: u8,
 ) -> Point {
     let fewer = k.max(30);
-    let in_layers = fewer < count && has_layers(points, i, around, (count, k), rounds);
+    let layers = 0.4 * f64::from(rounds);
+    let in_layers = fewer < count && is_over(points, i, around, (count, k), layers);
     let around = nearest(around, if in_layers { fewer } else { count });
     let Some((offset, _)) = offset_from(points, i, around) else {
         return points[i];
@@ -142,7 +142,7 @@ fn follows(points: &[Point], i: usize, k: usize, rounds: &[u8]) -> bool {
     let around = around(points, i - 1, &vec![false; points.len()]);
     let reach2 = last2(points, i - 1, nearest(&around, 2 * k));
     4 * distance2(points[i], points[i - 1]) <= reach2
-        && !has_layers(points, i - 1, &around, (2 * k, k), 2)
+        && !is_over(points, i - 1, &around, (2 * k, k), 0.7)
 }
 
 /// The shape of a cloud.

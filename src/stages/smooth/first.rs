@@ -1,7 +1,7 @@
 //! The first round of smoothing: decides in how many rounds each point moves, and which points follow the point
 //! before them (docs/method.md, section 4.3).
 
-use super::followers::{Followers, LEAST_ROUNDS, leader};
+use super::followers::{Followers, leader};
 use super::foot::Feet;
 use super::mover::{Mover, Noisy};
 use super::{Relaxing, run_of};
@@ -144,8 +144,7 @@ impl FirstRound<'_> {
             }
             let rounds = self.rounds(around);
             decided.rounds.set(place, rounds);
-            let leads =
-                rounds >= LEAST_ROUNDS && leader(id).is_none() && self.is_near_next(place, around);
+            let leads = rounds > 1 && leader(id).is_none() && self.is_near_next(place, around);
             if leader(id).is_none() && place + 1 < self.ids.len() {
                 last.set(Some((id, leads)));
                 if leads {

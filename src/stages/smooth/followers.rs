@@ -2,9 +2,6 @@
 
 use crate::levels::Levels;
 
-/// A point that moves in at least this number of rounds can be followed.
-pub(super) const LEAST_ROUNDS: u8 = 2;
-
 /// Ids from a multiple of this number on can be copied.
 const WHOLE: usize = 8;
 

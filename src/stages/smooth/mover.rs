@@ -1,6 +1,5 @@
 //! Moves noisy points to the surface around them, as far as they are noisy (docs/method.md, section 4.3).
 
-use super::followers::LEAST_ROUNDS;
 use super::foot::{Feet, Foot, Settle};
 use super::{Relaxing, moved};
 use crate::spacing::spacing2;
@@ -37,11 +36,9 @@ impl Noisy {
         }
     }
 
-    /// True if neighbours with this mean squared height over their surface, which reach as far as `count` of all
-    /// points, are farther from it than noise that asks for so many rounds explains: there are layers, such as the two
-    /// sides of a thin plate, or details.
-    fn has_layers(&self, rounds: u8, mean2: f64, count: usize) -> bool {
-        let limit = METHOD.noise.layers * f64::from(rounds);
+    /// True if the mean squared height of the neighbours over their surface, which reach as far as `count` of all points,
+    /// is more than that of `limit` local spacings.
+    fn is_over(&self, limit: f64, mean2: f64, count: usize) -> bool {
         mean2 > limit * limit * spacing2(self.reach2, count)
     }
 }
@@ -79,12 +76,15 @@ impl<P: FnMut(Noisy, Point)> Mover<P> {
 }
 
 impl<P: FnMut(Noisy, Point)> Settle<Noisy> for Mover<P> {
+    /// Neighbours lie in layers, such as the two sides of a thin plate, or show details, if they are farther from their
+    /// surface than noise explains.
     fn look(&mut self, noisy: &Noisy, mean2: f64) -> bool {
         let most = self.relaxing.most();
-        if noisy.leads && noisy.has_layers(LEAST_ROUNDS, mean2, most) {
+        if noisy.leads && noisy.is_over(METHOD.noise.follow, mean2, most) {
             self.scattered.push(noisy.id);
         }
-        self.relaxing.fewer() < noisy.count && noisy.has_layers(noisy.rounds, mean2, most)
+        let layers = METHOD.noise.layers * f64::from(noisy.rounds);
+        self.relaxing.fewer() < noisy.count && noisy.is_over(layers, mean2, most)
     }
 
     fn settle_layered(&mut self, noisy: Noisy, around: &mut Around) {
