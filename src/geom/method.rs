@@ -151,7 +151,7 @@ constants! {
         few: usize = 10, "one in";
         /// Root mean square height of a point's neighbours over their surface up to which the next point may follow
         /// it, that is move by others in its last round only. So a landscape with noise of half a spacing is
-        /// smoothed in 0.7 of the time. With 0.8 there are some holes in noise of a spacing, and beside birds and
+        /// smoothed in 0.75 of the time. With 0.8 there are some holes in noise of a spacing, and beside birds and
         /// wires.
         follow: f64 = 0.7, "local spacings";
         /// Most rounds, by default.
