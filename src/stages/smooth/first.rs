@@ -3,7 +3,7 @@
 
 use super::followers::{Followers, leader};
 use super::foot::Feet;
-use super::mover::{Mover, Noisy};
+use super::mover::{Mover, Noisy, farthest2};
 use super::{Relaxing, run_of};
 use crate::cells::{Among, each_around};
 use crate::levels::{HIGHEST, Levels};
@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use std::cell::Cell;
 use std::ops::Range;
 
-/// What the first round decides about a range of points.
+/// In how many rounds the points of a range move, and which of them follow the point before them.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct Decided {
     /// For each point, the number of rounds in which it moves; a follower moves in the last of them only.
@@ -183,9 +183,10 @@ impl FirstRound<'_> {
 
     /// True if there is a next point, so near to a leader with these neighbours that it may follow.
     fn is_near_next(&self, place: usize, around: &Around) -> bool {
-        let limit = METHOD.smoothing.farthest * METHOD.smoothing.farthest * around.last2() as f64;
         let next = self.points.get(place + 1);
-        next.is_some_and(|next| distance2(self.points[place], *next) as f64 <= limit)
+        next.is_some_and(|next| {
+            distance2(self.points[place], *next) as f64 <= farthest2(around.last2())
+        })
     }
 
     /// Moves the points at the places `late`, about which nothing is decided yet.

@@ -1,4 +1,4 @@
-//! Which points follow the point before them (docs/method.md, section 4.3): one bit for two ids.
+//! Which points follow the point before them (docs/method.md, section 4.3): two bits for two ids.
 
 use crate::levels::Levels;
 

@@ -7,6 +7,12 @@ use crate::tiles::near::{Around, Nearer};
 use outcrop_geom::Point;
 use outcrop_geom::method::METHOD;
 
+/// The squared distance, in steps, up to which a point with neighbours that reach this far, squared, has a foot, and
+/// the next point may follow it.
+pub(super) fn farthest2(reach2: u64) -> f64 {
+    METHOD.smoothing.farthest * METHOD.smoothing.farthest * reach2 as f64
+}
+
 /// A noisy point.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Noisy {
@@ -27,9 +33,8 @@ pub(super) struct Noisy {
 impl Noisy {
     /// The position to which it moves. An outlier, which is too far from the surface, stays.
     fn moved(&self, Foot { offset }: Foot) -> Point {
-        let limit = METHOD.smoothing.farthest;
         let length2 = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2];
-        if length2 > limit * limit * self.reach2 as f64 {
+        if length2 > farthest2(self.reach2) {
             self.point
         } else {
             moved(self.point, offset)

@@ -55,7 +55,7 @@ pub struct RelaxStats {
 struct Done {
     /// The first of the points.
     first: usize,
-    /// What the first round decides about them; empty after the first round.
+    /// Their numbers of rounds, and the followers among them; empty after the first round.
     decided: Decided,
     moves: Moves,
 }
@@ -68,7 +68,7 @@ struct Round<'a> {
     original: &'a PointStore,
     /// The levels of noise.
     levels: &'a Levels,
-    /// What the first round decided about all points.
+    /// The numbers of rounds of all points, and the followers among them; empty in the first round.
     decided: &'a Decided,
 }
 

@@ -242,7 +242,8 @@ fn check_around(points: &[Point], tile: &Tile, k: usize, level: Level) {
     tile.for_some_around((k, |_| k), &mut Search::at(level), wanted, |_| (), each);
 }
 
-/// Compares different numbers of neighbours around all points, where only some can be neighbours, with those of a sorted list.
+/// Compares different numbers of neighbours around all points, where only some can be neighbours, with those of a
+/// sorted list.
 fn check_chosen(points: &[Point], mut tile: Tile, k: usize, level: Level) {
     let chosen = |id: usize| !(id / 2).is_multiple_of(3) || id.is_multiple_of(5);
     tile.choose(chosen);
