@@ -174,7 +174,8 @@ constants! {
         /// Points for each vertical column of space, whose highest point faces up.
         column: u64 = 64, "points";
         /// Least evidence that fixes the orientation of a piece without connections. With 0 an aerial scan
-        /// loses 0.1 % of its points, and 5 % more triangles are cut.
+        /// loses 0.1 % of its points, and 5 % more triangles are cut. A part is turned again for more than its
+        /// upward weight, 512. For any gain, lone-star has 5 % more boundary.
         held: i64 = 1024, "evidence";
     }
     /// Admissible triangles.

@@ -165,6 +165,7 @@ fn robust() {
         "flagged elsewhere",
         "cut inside",
         "cut between",
+        "looked back",
         "under sky",
         "turned by sky",
     ];

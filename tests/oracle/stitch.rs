@@ -120,6 +120,7 @@ fn pipeline(
     let division = Division {
         patch: settings.patch,
         cluster: settings.cluster as u64,
+        gain: settings.gain,
     };
     let extraction = StitchOptions {
         cos_max_angle: settings.cos_max_angle,
@@ -263,6 +264,7 @@ fn divided(seed: u64) -> Settings {
         block: [4, 9, 25, 1000, 60][seed as usize / 4 % 5],
         patch: [4, 9, 16, 256][seed as usize / 8 % 4],
         cluster: [2, 7, 40, 1024, 15][seed as usize / 3 % 5],
+        gain: [0, 512, 30][seed as usize / 5 % 3],
         ..varied(seed)
     }
 }

@@ -31,6 +31,13 @@ pub struct Graph {
     touching: BTreeSet<usize>,
 }
 
+/// The upward weight of evidence.
+fn upward(evidence: i64) -> i64 {
+    let size = evidence.abs();
+    let root = (0..).find(|x| (x + 1) * (x + 1) > size).expect("a root");
+    16 * root * evidence.signum()
+}
+
 fn pair(a: usize, b: usize) -> Pair {
     [a.min(b), a.max(b)]
 }
@@ -61,11 +68,9 @@ impl Graph {
         }
     }
 
-    /// The upward weight of a node.
+    /// The size of a node's upward weight.
     fn upward(&self, node: usize) -> i64 {
-        let size = self.nodes[node].up.abs();
-        let root = (0..).find(|x| (x + 1) * (x + 1) > size).expect("a root");
-        16 * root
+        upward(self.nodes[node].up).abs()
     }
 
     /// The sum of a pair; for a pair with the sky it includes the upward weight of the other node.
@@ -157,10 +162,74 @@ impl Graph {
         changed
     }
 
+    /// Contracts pairs, then looks at the contractions again (section 6.3, step 6).
+    pub fn settle(&mut self, gain: i64, met: &mut Weighing) -> Homes {
+        let before = self.clone();
+        let mut contractions = Vec::new();
+        let clusters =
+            self.contract_noting(None, met, |goes, stays| contractions.push([goes, stays]));
+        let alone = |home| Side {
+            home,
+            turned: false,
+        };
+        let mut turned: Vec<bool> = (0..before.nodes.len())
+            .map(|node| clusters.seen_from_label(alone(node)).turned)
+            .collect();
+        let mut members: Vec<BTreeSet<usize>> =
+            (0..turned.len()).map(|node| [node].into()).collect();
+        let mut parts = Vec::new();
+        for both in contractions {
+            let both_parts = both.map(|node| members[node].clone());
+            members[both[1]].extend(&both_parts[0]);
+            parts.push(both_parts);
+        }
+        for part in parts.iter().rev().flatten() {
+            if !part.contains(&before.sky.expect("a sky")) && before.holds(part, &turned) < -gain {
+                met.looked_back += 1;
+                part.iter().for_each(|&node| turned[node] = !turned[node]);
+            }
+        }
+        let mut settled = Homes::apart(turned.len());
+        for node in 0..turned.len() {
+            let label = clusters.label(node);
+            let [a, b] = [label, node].map(|home| Side {
+                home,
+                turned: turned[home],
+            });
+            settled.join(a, b);
+        }
+        settled
+    }
+
+    /// The weight that holds a part as its nodes are turned: of its connections, and upwards.
+    fn holds(&self, part: &BTreeSet<usize>, turned: &[bool]) -> i64 {
+        let sign = |turned: bool| if turned { -1 } else { 1 };
+        let leaves = |pair: &Pair| part.contains(&pair[0]) != part.contains(&pair[1]);
+        let sums = self.sums.iter().filter(|(pair, _)| leaves(pair));
+        let outside: i64 = sums
+            .map(|([a, b], sum)| sign(turned[*a] != turned[*b]) * sum)
+            .sum();
+        let up: i64 = part
+            .iter()
+            .map(|&v| sign(turned[v]) * self.nodes[v].up)
+            .sum();
+        outside + upward(up)
+    }
+
     /// Contracts pairs: without `most` all but those with the sky that stay free, otherwise those that may be
     /// contracted. Returns the cluster of each node, as the number of the node that names it, and whether the
     /// node is turned in it.
     pub fn contract(&mut self, most: Option<usize>, met: &mut Weighing) -> Homes {
+        self.contract_noting(most, met, |_, _| ())
+    }
+
+    /// As `contract`; `note` is called with the node that goes and the one that stays.
+    fn contract_noting(
+        &mut self,
+        most: Option<usize>,
+        met: &mut Weighing,
+        mut note: impl FnMut(usize, usize),
+    ) -> Homes {
         let mut clusters = Homes::apart(self.nodes.len());
         let mut due: BTreeSet<Pair> = self.sums.keys().copied().collect();
         loop {
@@ -184,6 +253,7 @@ impl Graph {
             let [a, b] =
                 [(stays, false), (goes, sum < 0)].map(|(home, turned)| Side { home, turned });
             clusters.join(a, b);
+            note(goes, stays);
             let changed = self.merge(stays, goes, sum < 0);
             due.retain(|pair| !pair.contains(&goes));
             due.extend(changed);

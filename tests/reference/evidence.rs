@@ -195,7 +195,7 @@ impl Weigher<'_> {
         let labels = self.nodes.clone();
         self.add_crossing_nodes();
         self.graph.push_sky();
-        let settled = self.graph.contract(None, &mut self.met);
+        let settled = self.graph.settle(self.known.settings.gain, &mut self.met);
         // All triangles of a label are joined at this point.
         let mut first: BTreeMap<usize, (Triangle, bool)> = BTreeMap::new();
         for (t, side) in labels {

@@ -79,6 +79,8 @@ pub struct Settings {
     pub patch: u32,
     /// `C`.
     pub cluster: usize,
+    /// `G`.
+    pub gain: i64,
     /// Largest number of rounds in which noisy points move.
     pub relax: u32,
     /// They move in the mesh too.
@@ -109,6 +111,7 @@ impl Default for Settings {
             block: 65_536,
             patch: 256,
             cluster: 1024,
+            gain: 512,
             relax: 0,
             auto: false,
             robust: false,

@@ -29,6 +29,8 @@ pub struct Weighing {
     pub turned_by_sky: usize,
     /// Step 6: pairs with the sky that were examined and not contracted.
     pub left_free: usize,
+    /// Step 6: parts turned by the second look.
+    pub looked_back: usize,
     /// Step 7: crossing triangles removed, and triangles removed at edges between labels.
     pub cut_crossing: usize,
     pub cut_between: usize,
@@ -44,7 +46,7 @@ impl Weighing {
     }
 
     /// All counts with their names.
-    pub fn all(&self) -> [(&'static str, usize); 17] {
+    pub fn all(&self) -> [(&'static str, usize); 18] {
         [
             ("folded", self.folded),
             ("faced", self.faced),
@@ -61,6 +63,7 @@ impl Weighing {
             ("under sky", self.under_sky),
             ("turned by sky", self.turned_by_sky),
             ("left free", self.left_free),
+            ("looked back", self.looked_back),
             ("cut crossing", self.cut_crossing),
             ("cut between", self.cut_between),
         ]
@@ -84,6 +87,7 @@ impl Weighing {
             under_sky,
             turned_by_sky,
             left_free,
+            looked_back,
             cut_crossing,
             cut_between,
         } = more;
@@ -102,6 +106,7 @@ impl Weighing {
         self.under_sky += under_sky;
         self.turned_by_sky += turned_by_sky;
         self.left_free += left_free;
+        self.looked_back += looked_back;
         self.cut_crossing += cut_crossing;
         self.cut_between += cut_between;
     }

@@ -64,7 +64,6 @@ pub(super) fn base(
         Some(division) => Some((division, None)),
         None => None,
     };
-    let weigh = by_evidence.is_some();
     let look = Look {
         candidates: Table::new("stitch.candidates", count),
         crossing: Table::new("stitch.crossing", count),
@@ -77,7 +76,7 @@ pub(super) fn base(
     };
     let bytes = |block: usize| {
         let records = triples.own.expected_rows(workspace, block) + visiting.rows(block);
-        let outside = places.outside.filter(|_| weigh);
+        let outside = places.outside.filter(|_| options.weigh.is_some());
         let known = outside.map_or(0, |o| o.bytes(blocks.ids(block).len()));
         100 * records as u64 + known + (3 << 20)
     };
@@ -92,7 +91,7 @@ pub(super) fn base(
         all.flat_candidates += found.flat_candidates;
     };
     let inside = workspace.part("base", || {
-        orient_inside(name, around, each, bytes, blocks, weigh, workspace)
+        orient_inside(name, around, each, bytes, blocks, options.weigh, workspace)
     })?;
     let start = std::time::Instant::now();
     let flags = look.flags.open(workspace, count)?.unique();

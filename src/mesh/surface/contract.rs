@@ -25,6 +25,17 @@ pub enum Limit {
     Triangles(u64),
 }
 
+/// Two nodes that became one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Contraction<N> {
+    /// The node whose number the contracted node keeps.
+    pub stays: N,
+    /// The other one.
+    pub goes: N,
+    /// The sum of their connections as they are oriented then, without upward weights.
+    pub sum: i64,
+}
+
 /// A graph with signed sums between nodes, under contraction.
 #[derive(Debug, Default)]
 pub struct Graph<N> {
@@ -48,6 +59,13 @@ pub struct Graph<N> {
 
 /// A pair in the order of contraction: the largest weight first, then the smallest nodes.
 type Due<N> = (u64, Reverse<(N, N)>);
+
+/// The upward weight of evidence: evidence grows with the area, connections with the circumference, hence a
+/// square root.
+#[must_use]
+pub fn upward(evidence: i64) -> i64 {
+    evidence.signum() * METHOD.orientation.flattest * evidence.unsigned_abs().isqrt() as i64
+}
 
 fn key<N: Ord>(a: N, b: N) -> (N, N) {
     if a <= b { (a, b) } else { (b, a) }
@@ -92,8 +110,8 @@ impl<N: Number> Graph<N> {
         self.up[node.index()] += evidence;
     }
 
-    /// Adds the node `sky`, with a pair for each node that has evidence.
-    pub fn push_sky(&mut self) {
+    /// Adds the node `sky`, with a pair for each node that has evidence, and returns it.
+    pub fn push_sky(&mut self) -> N {
         let sky = self.push();
         self.sky = Some(sky);
         for node in (0..sky.index()).map(N::at) {
@@ -101,13 +119,12 @@ impl<N: Number> Graph<N> {
                 self.add(node, sky, 0);
             }
         }
+        sky
     }
 
-    /// The upward weight of a node: evidence grows with the area, connections with the circumference, hence a
-    /// square root.
+    /// The upward weight of a node.
     fn upward(&self, node: N) -> i64 {
-        let up = self.up[node.index()];
-        up.signum() * METHOD.orientation.flattest * up.unsigned_abs().isqrt() as i64
+        upward(self.up[node.index()])
     }
 
     /// The weight of a pair with this sum.
@@ -186,8 +203,12 @@ impl<N: Number> Graph<N> {
 
     /// Contracts pairs until none is due. A pair is due at first, and again when a contraction renames it or
     /// adds to it. A contracted node keeps the number of the node with more pairs, or the smaller number if
-    /// they have equally many.
-    pub fn contract(&mut self, limit: Limit) -> ParitySets<N> {
+    /// they have equally many. `note` is called with each contraction.
+    pub fn contract(
+        &mut self,
+        limit: Limit,
+        mut note: impl FnMut(Contraction<N>),
+    ) -> ParitySets<N> {
         let mut sets = ParitySets::new(self.len());
         let mut totals = self.outside.clone();
         for (&(a, b), sum) in &self.sums {
@@ -204,6 +225,7 @@ impl<N: Number> Graph<N> {
             if self.is_free(a, b) {
                 continue;
             }
+            let connections = sum;
             let sum = self.weight(a, b, sum);
             if sum.unsigned_abs() != size {
                 continue;
@@ -226,6 +248,11 @@ impl<N: Number> Graph<N> {
             let swap = degree(b) > degree(a);
             let (a, b) = if swap { (b, a) } else { (a, b) };
             sets.join(a, b, sum < 0);
+            note(Contraction {
+                stays: a,
+                goes: b,
+                sum: signed(sum < 0, connections),
+            });
             self.merge(a, b, sum, &mut totals, &mut queue);
         }
         sets

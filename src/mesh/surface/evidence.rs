@@ -3,6 +3,7 @@
 //! Where not everything can be oriented consistently, the surface should be cut where the connections have
 //! the least weight: a few edges at the foot of a wall rather than a kilometre of meadow.
 
+use super::contract::upward;
 use super::star::Triangle;
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_geom::method::METHOD;
@@ -18,6 +19,8 @@ pub struct Division {
     /// Most triangles that are joined inside a block where turning one part could still reduce the cut weight
     /// in the rest of the cloud.
     pub cluster: u64,
+    /// A part that was contracted is turned again if this lowers the weight that is cut by more than this.
+    pub gain: i64,
 }
 
 impl Default for Division {
@@ -25,6 +28,7 @@ impl Default for Division {
         Self {
             patch: METHOD.curve.patch as u32,
             cluster: METHOD.orientation.cluster,
+            gain: upward(METHOD.orientation.held),
         }
     }
 }

@@ -8,6 +8,7 @@ mod contract;
 mod crossing;
 mod crossing_edges;
 pub mod evidence;
+mod history;
 mod labels;
 pub mod orient;
 pub mod parity;

@@ -1,7 +1,7 @@
 //! Components and orientation of a surface given block by block: first each block on its own, then the blocks
 //! together with the crossing triangles.
 
-use super::evidence::Evidence;
+use super::evidence::{Division, Evidence};
 use super::labels::orient_block;
 use super::parity::{ParitySets, constraint};
 use super::rows::{
@@ -90,18 +90,21 @@ pub(super) struct Weighed {
     pub seams: Table<Seam>,
     /// Unit normals of the crossing triangles, in their order.
     pub normals: Table<Normal>,
+    /// See [`Division::gain`].
+    pub gain: i64,
 }
 
 release!(Weighed: pairs, ups, normals);
 
 impl Weighed {
-    fn new(name: &str, count: usize) -> Self {
+    fn new(name: &str, count: usize, division: Division) -> Self {
         let table = |part: &str| format!("{name}.{part}");
         Self {
             pairs: Table::new(&table("pairs"), count),
             ups: Table::new(&table("ups"), count),
             seams: Table::new(&table("seams"), count),
             normals: Table::new(&table("normals"), count),
+            gain: division.gain,
         }
     }
 }
@@ -135,7 +138,7 @@ pub fn orient_inside<T: Serialize + DeserializeOwned + Send>(
     mut each: impl FnMut(usize, T) + Send,
     bytes: impl Fn(usize) -> u64 + Sync,
     blocks: Blocks,
-    evidence: bool,
+    division: Option<Division>,
     workspace: &Workspace,
 ) -> Result<OrientedInside> {
     let count = blocks.count();
@@ -143,7 +146,7 @@ pub fn orient_inside<T: Serialize + DeserializeOwned + Send>(
     let interior = Table::new(&table("interior"), count);
     let first = Table::new(&table("border"), count);
     let relations = Shuffle::new(&table("relations"));
-    let weighed = evidence.then(|| Weighed::new(name, count));
+    let weighed = division.map(|division| Weighed::new(name, count, division));
     let work = |unit: &Unit<'_>| {
         let block = unit.number();
         let BlockTriangles {

@@ -4,6 +4,7 @@
 use super::contract::{Graph, Limit};
 use super::crossing_edges::CrossingEdges;
 use super::evidence::{cosine, weight};
+use super::history::History;
 use super::orient::{OrientedSurface, Weighed};
 use super::parity::{OrientationConstraint, signed, word};
 use super::rows::{Relation, interior_constraints, sum};
@@ -65,13 +66,20 @@ pub(super) fn settle(
         reserved.at_least(graph.bytes())?;
     }
     drop(edges);
-    graph.push_sky();
-    reserved.set_held(graph.bytes());
-    let clusters = graph.contract(Limit::None);
+    let sky = graph.push_sky();
+    let most = History::most(&graph);
+    reserved.at_least(most)?;
+    reserved.set_held(most);
+    let mut history = History::of(&graph);
+    let clusters = graph.contract(Limit::None, |contraction| history.push(contraction));
+    let nodes = graph.len();
+    drop(graph);
+    let turned = history.look_back(&clusters, sky, weighed.gain);
     // One label of the surface that represents each cluster.
-    let mut representative = vec![None; graph.len()];
+    let mut representative = vec![None; nodes];
     for label in (0..surface.sets.len()).map(GlobalLabel::at) {
         let (root, flip) = clusters.look(label);
+        let flip = flip ^ turned[label.index()];
         match representative[root.index()] {
             None => representative[root.index()] = Some((label, flip)),
             Some((first, turned)) => _ = surface.sets.join(first, label, flip ^ turned),

@@ -190,7 +190,7 @@ impl Weigher<'_> {
 
     /// Contracts patches to clusters, as far as this cannot be wrong for the rest of the cloud.
     fn contract(&mut self, cluster: u64, connections: &mut Connections) {
-        let clusters = self.graph.contract(Limit::Triangles(cluster));
+        let clusters = self.graph.contract(Limit::Triangles(cluster), |_| ());
         let root = |patch: PatchNumber| self.patches.roots[patch.index()].0;
         for patch in (0..self.patches.roots.len()).map(PatchNumber::at) {
             let (of, flip) = clusters.look(patch);

@@ -95,6 +95,7 @@ pub fn pipeline(
         division: Division {
             patch: settings.patch,
             cluster: settings.cluster as u64,
+            gain: settings.gain,
         },
         ..Params::paper()
     };

@@ -147,7 +147,7 @@ proptest! {
             plain.sums.extend(ups.map(|v| ((v, count), 0)));
             plain.nodes.push((0, 0, 0));
         }
-        let (clusters, of) = (graph.contract(limit), plain.contract(limit));
+        let (clusters, of) = (graph.contract(limit, |_| ()), plain.contract(limit));
         for (v, of) in (0..).zip(of) {
             prop_assert_eq!(clusters.look(v), of);
         }
@@ -177,7 +177,7 @@ fn a_ring_that_cannot_agree_is_cut_at_its_least_connection() {
                 (n, (n + 1) % 4, if n == 1 { -weight } else { weight })
             })
             .collect();
-        let mut sets = graph(&single(4), &ring, false).contract(Limit::None);
+        let mut sets = graph(&single(4), &ring, false).contract(Limit::None, |_| ());
         for (n, (a, b, weight)) in (0..).zip(ring) {
             let agrees = sets.relation(a, b) == Some(weight < 0);
             assert_eq!(agrees, n != least, "{n} of a ring that is cut at {least}");
@@ -189,7 +189,7 @@ fn a_ring_that_cannot_agree_is_cut_at_its_least_connection() {
 #[test]
 fn parallel_sums_add_up_before_they_are_compared() {
     let pairs = [(0, 1, 10), (0, 2, 4), (1, 2, 4), (2, 3, 5), (3, 0, -7)];
-    let mut sets = graph(&single(4), &pairs, false).contract(Limit::None);
+    let mut sets = graph(&single(4), &pairs, false).contract(Limit::None, |_| ());
     assert_eq!(sets.relation(0, 2), Some(false));
     assert_eq!(sets.relation(0, 3), Some(true));
 }
@@ -197,7 +197,7 @@ fn parallel_sums_add_up_before_they_are_compared() {
 #[test]
 fn ties_are_broken_by_numbers_and_sums_of_nothing_run_alike() {
     let equal = [(1, 2, -1), (0, 2, 1), (0, 1, 1)];
-    let mut sets = graph(&single(3), &equal, false).contract(Limit::None);
+    let mut sets = graph(&single(3), &equal, false).contract(Limit::None, |_| ());
     // The first two follow node 0; the last connection has no influence any more.
     assert_eq!(sets.relation(0, 1), Some(false));
     assert_eq!(sets.relation(1, 2), Some(false));
@@ -209,11 +209,14 @@ fn a_part_contracts_what_is_small_or_sure() {
     // Turning node 1 could pay because of its connections outside; node 0 has no other connection.
     let nodes = vec![(3, 0, 0), (4, 1000, 0)];
     let mut sure = graph(&nodes, &[(0, 1, 1)], false);
-    assert_eq!(sure.contract(most(0)).relation(0, 1), Some(false));
+    assert_eq!(sure.contract(most(0), |_| ()).relation(0, 1), Some(false));
     let nodes = vec![(3, 3, 0), (4, 1000, 0)];
     for (triangles, joined) in [(6, None), (7, Some(true))] {
         let mut graph = graph(&nodes, &[(0, 1, -2)], false);
-        assert_eq!(graph.contract(most(triangles)).relation(0, 1), joined);
+        assert_eq!(
+            graph.contract(most(triangles), |_| ()).relation(0, 1),
+            joined
+        );
     }
 }
 
@@ -222,7 +225,7 @@ fn what_faces_up_is_not_turned_by_less() {
     // Both face up, but should not be oriented alike; their upward weights are 16 and 32.
     for (sum, joined) in [(-15, None), (-16, Some(true)), (15, Some(false))] {
         let mut graph = graph(&vec![(1, 0, 1), (1, 0, 4)], &[(0, 1, sum)], false);
-        let mut sets = graph.contract(Limit::Triangles(100));
+        let mut sets = graph.contract(Limit::Triangles(100), |_| ());
         assert_eq!(sets.relation(0, 1), joined, "{sum}");
     }
 }
@@ -237,7 +240,7 @@ fn the_sky_turns_what_faces_down_unless_more_speaks_against_it() {
         (-5000, [false, true]),
     ] {
         let mut graph = graph(&nodes, &[(0, 1, sum)], true);
-        let mut sets = graph.contract(Limit::None);
+        let mut sets = graph.contract(Limit::None, |_| ());
         let found = [0, 1].map(|node| sets.relation(node, sky));
         assert_eq!(found, turned.map(Some), "{sum}");
         // Without evidence and connections it remains a component of its own.
@@ -253,10 +256,17 @@ fn the_sky_holds_no_small_piece_that_nothing_connects() {
         (-METHOD.orientation.held, Some(true)),
     ] {
         let mut graph = graph(&vec![(1, 0, up)], &[], true);
-        assert_eq!(graph.contract(Limit::None).relation(0, 1), held, "{up}");
+        assert_eq!(
+            graph.contract(Limit::None, |_| ()).relation(0, 1),
+            held,
+            "{up}"
+        );
     }
     // Connections whose sum is 0 are still connections.
     let nodes = vec![(1, 0, 90_000), (1, 0, 80_000), (1, 0, 4)];
     let mut graph = graph(&nodes, &[(0, 2, 5), (1, 2, -5)], true);
-    assert_eq!(graph.contract(Limit::None).relation(2, 3), Some(false));
+    assert_eq!(
+        graph.contract(Limit::None, |_| ()).relation(2, 3),
+        Some(false)
+    );
 }

@@ -83,7 +83,7 @@ proptest! {
         patch in 1u32..30,
     ) {
         let triangles = band(9, twist, &names, &gone);
-        let evidence = evidence(&places, Division { patch, cluster: 0 });
+        let evidence = evidence(&places, Division { patch, cluster: 0, gain: 0 });
         let ids = Ids::of(0..places.len() as u32);
         let mut patches = Patches::of(ids, &triangles, &evidence, patch);
         let mut shared = patches.shared.clone();
@@ -133,7 +133,14 @@ fn a_patch_ends_at_a_fold_and_where_its_run_ends() {
         })
         .collect();
     for (patch, firsts) in [(30, vec![0, 12]), (18, vec![0, 12, 18])] {
-        let evidence = evidence(&places, Division { patch, cluster: 0 });
+        let evidence = evidence(
+            &places,
+            Division {
+                patch,
+                cluster: 0,
+                gain: 0,
+            },
+        );
         let patches = Patches::of(Ids::of(0..30), &triangles, &evidence, patch);
         let found: Vec<Id> = patches
             .roots

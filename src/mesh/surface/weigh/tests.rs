@@ -42,7 +42,7 @@ proptest! {
         patch in 1u32..30,
     ) {
         let triangles = band(9, twist, &names, &gone);
-        let division = Division { patch, cluster: 1000 };
+        let division = Division { patch, cluster: 1000, gain: 0 };
         let (mut sets, dead) = oriented(&triangles, &places, division);
         let mut contradicted = vec![false; triangles.len()];
         for (n, m, flip) in inner_edges(Ids::of(0..27), &triangles) {
@@ -75,6 +75,7 @@ fn the_surface_is_cut_where_it_is_folded() {
         let division = Division {
             patch,
             cluster: 1000,
+            gain: 0,
         };
         let (_, dead) = oriented(&triangles, &places, division);
         let removed = (0..triangles.len()).filter(|&n| dead[n]);
