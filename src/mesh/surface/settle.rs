@@ -12,6 +12,7 @@ use super::star::Triangle;
 use outcrop_disk::error::Result;
 use outcrop_disk::spill::Inbox;
 use outcrop_disk::workspace::Unit;
+use outcrop_disk::workspace::memory::Reservation;
 use outcrop_geom::method::METHOD;
 use outcrop_stages::blocks::Blocks;
 use outcrop_stages::ids::GlobalLabel;
@@ -66,6 +67,16 @@ pub(super) fn settle(
         reserved.at_least(graph.bytes())?;
     }
     drop(edges);
+    join_clusters(surface, graph, weighed.gain, &mut reserved)
+}
+
+/// Contracts the graph of the labels, looks at the contractions again, and joins the labels of each cluster.
+fn join_clusters(
+    surface: &mut OrientedSurface,
+    mut graph: Graph<GlobalLabel>,
+    gain: i64,
+    reserved: &mut Reservation,
+) -> Result<()> {
     let sky = graph.push_sky();
     let most = History::most(&graph);
     reserved.at_least(most)?;
@@ -74,7 +85,7 @@ pub(super) fn settle(
     let clusters = graph.contract(Limit::None, |contraction| history.push(contraction));
     let nodes = graph.len();
     drop(graph);
-    let turned = history.look_back(&clusters, sky, weighed.gain);
+    let turned = history.look_back(&clusters, sky, gain);
     // One label of the surface that represents each cluster.
     let mut representative = vec![None; nodes];
     for label in (0..surface.sets.len()).map(GlobalLabel::at) {
