@@ -90,7 +90,8 @@ pub use outcrop_view as view;
 /// Inspection of clouds and meshes without a reconstruction.
 pub mod inspect {
     pub use crate::info;
-    pub use outcrop_inspect::{change, compare, verify};
+    pub use crate::pipeline::compare;
+    pub use outcrop_inspect::{change, verify};
     pub use outcrop_survey::{raster, volume};
 }
 
@@ -102,7 +103,8 @@ pub use outcrop_disk::workspace::Workspace;
 pub use outcrop_disk::workspace::memory::MemoryPool;
 pub use outcrop_disk::workspace::outlook::{Outlook, Planned, Position};
 pub use outcrop_disk::workspace::progress::{Cancel, Observer, Silent};
-pub use outcrop_points::{Classes, hide_caught_panics};
+pub use outcrop_formats::hide_caught_panics;
+pub use outcrop_points::Classes;
 pub use params::{
     Division, Facing, InputNormals, MaxWidth, Method, Origin, Params, Radius, Region, Smooth,
     Smoothing,

@@ -8,6 +8,7 @@ mod checks;
 mod clock;
 #[cfg(feature = "levels")]
 mod close;
+pub mod compare;
 mod disk;
 mod levels;
 mod like;
@@ -148,7 +149,7 @@ impl Reconstruction {
     /// run can be resumed, see [`Reconstruction::is_unfinished`].
     pub fn run(&self) -> Result<Report> {
         if let Some(delivery) = &self.delivery {
-            delivery.refuse_inputs(&outcrop_points::expand(&self.inputs)?)?;
+            delivery.refuse_inputs(&outcrop_formats::expand(&self.inputs)?)?;
             delivery.prepare()?;
         }
         writable(&self.mesh)?;

@@ -3,7 +3,8 @@
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
 use outcrop_disk::workspace::progress::{Cancel, Silent};
-use outcrop_points::{Spool, ingest};
+use outcrop_formats::ingest;
+use outcrop_points::Spool;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

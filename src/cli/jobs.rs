@@ -11,8 +11,8 @@ use crate::features::LEVELS;
 use crate::info;
 use crate::params::Params;
 use crate::pipeline::{
-    Builder, ChangeDetection, Rasterization, Reconstruction, default_memory, default_threads,
-    temporary,
+    Builder, ChangeDetection, Rasterization, Reconstruction, compare, default_memory,
+    default_threads, temporary,
 };
 #[cfg(feature = "levels")]
 use crate::pipeline::{Closing, Simplification, Tiles};
@@ -21,7 +21,7 @@ use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::memory::MemoryPool;
 use outcrop_disk::workspace::progress::{Cancel, Observer};
-use outcrop_inspect::{change, compare, verify};
+use outcrop_inspect::{change, verify};
 use outcrop_points::is_remote;
 use outcrop_survey::raster;
 use outcrop_survey::volume::{self, Volumes};

@@ -55,7 +55,7 @@ pub fn main() -> ExitCode {
         eprintln!("outcrop: {why}");
         return ExitCode::from(FAILED);
     }
-    outcrop_points::hide_caught_panics();
+    outcrop_formats::hide_caught_panics();
     let args = command::Args::parse_from(outcrop_platform::names::arguments());
     match commands::run(args.command) {
         Ok(Ended::Yes) => ExitCode::SUCCESS,

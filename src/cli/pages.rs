@@ -9,12 +9,12 @@ pub use made::{change, compare, info, report, verify};
 mod made {
     use super::super::output::NewFile;
     use crate::params::Params;
-    use crate::pipeline::ChangeDetection;
+    use crate::pipeline::{ChangeDetection, compare};
     use crate::report::Report;
     use crate::{info, page};
     use outcrop_disk::error::Result;
     use outcrop_disk::workspace::Workspace;
-    use outcrop_inspect::{change, compare, verify};
+    use outcrop_inspect::{change, verify};
     use std::path::{Path, PathBuf};
 
     /// The report of a run.

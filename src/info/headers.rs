@@ -3,7 +3,8 @@
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::memory::MemoryPool;
 use outcrop_disk::workspace::progress::Cancel;
-use outcrop_points::{Fetched, Probe, Reads, Selection, expand, probe_near};
+use outcrop_formats::{Probe, Reads, expand, probe_near};
+use outcrop_points::{Fetched, Selection};
 use serde::Serialize;
 use std::fmt;
 use std::path::PathBuf;

@@ -59,7 +59,7 @@ pub(super) fn write(
     warnings.extend(write_origin(output, report)?);
     let path = path_beside(output, "prj");
     // That of an input stays as it is.
-    let of_input = outcrop_points::expand(inputs)?.iter().any(|input| {
+    let of_input = outcrop_formats::expand(inputs)?.iter().any(|input| {
         let other = canonical(&outcrop_points::prj_of(input));
         other.is_ok_and(|other| canonical(&path).is_ok_and(|path| path == other))
     });

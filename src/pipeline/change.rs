@@ -9,6 +9,7 @@ use outcrop_codecs::ply_mesh::{PlyMesh, Sink};
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::progress::{Cancel, Observer};
 use outcrop_disk::workspace::{Storage, Workspace};
+use outcrop_formats::ingest_selected;
 use outcrop_inspect::change::{self, Change, ChangeRow, Changes, Options, ROWS, State};
 use outcrop_mesh_files::export::{self, VertexColumn};
 use outcrop_ply::Scalar;
@@ -62,7 +63,8 @@ impl ChangeDetection {
     /// unfinished run without an output; those of an unfinished run, as of [`crate::Reconstruction::run`].
     pub fn run(&self) -> Result<Change> {
         let measure = |[old, new]: [&Path; 2], workspace: &Workspace| {
-            let (found, changes) = change::change(old, new, &self.options, workspace)?;
+            let (found, changes) =
+                change::change(old, new, &self.options, ingest_selected, workspace)?;
             Ok((found, changes, ()))
         };
         self.mapped(measure, |_, ()| Ok(()))
@@ -78,7 +80,7 @@ impl ChangeDetection {
         show: impl FnOnce(&Change, &change::Illustration) -> Result<()>,
     ) -> Result<Change> {
         let measure = |[old, new]: [&Path; 2], workspace: &Workspace| {
-            change::illustrated(old, new, &self.options, workspace)
+            change::illustrated(old, new, &self.options, ingest_selected, workspace)
         };
         self.mapped(measure, |found, drawn| show(found, &drawn))
     }

@@ -84,7 +84,7 @@ pub(super) fn not_an_input(output: &Path, split: bool, inputs: &[PathBuf]) -> Re
     let absolute = |path: &Path| canonical(path).ok();
     let folder = absolute(folder_of(output));
     let several = folder.map(|folder| folder.join(output.file_name().unwrap_or_default()));
-    for input in outcrop_points::expand(inputs)?.iter().filter(|_| split) {
+    for input in outcrop_formats::expand(inputs)?.iter().filter(|_| split) {
         let taken = |input: PathBuf| is_square_of(several.as_deref()?, &input).then_some(input);
         if let Some(input) = absolute(input).and_then(taken) {
             return Err(Error::Parameter {
@@ -103,7 +103,7 @@ pub(super) fn not_an_input(output: &Path, split: bool, inputs: &[PathBuf]) -> Re
     let Ok(output) = canonical(output) else {
         return Ok(());
     };
-    for input in outcrop_points::expand(inputs)? {
+    for input in outcrop_formats::expand(inputs)? {
         if canonical(&input).is_ok_and(|input| input == output) {
             return Err(Error::Parameter {
                 name: "output",
@@ -119,7 +119,7 @@ pub(super) fn not_an_input(output: &Path, split: bool, inputs: &[PathBuf]) -> Re
 pub(super) fn one_system(params: &Params, inputs: &[PathBuf]) -> Result<()> {
     match params.ignore_crs || params.crs.is_some() {
         true => Ok(()),
-        false => outcrop_points::check_systems(inputs),
+        false => outcrop_formats::check_systems(inputs),
     }
 }
 

@@ -20,10 +20,11 @@ use super::Reconstruction;
 use crate::params::{Method, Params, Smooth};
 use crate::report::DiskEstimate;
 use outcrop_disk::error::{Error, Result};
+use outcrop_formats::Probe;
 use outcrop_geom::aabb::Aabb;
 use outcrop_geom::lattice::Lattice;
 use outcrop_mesh_files::export::{self, CoordinateType, Mesh};
-use outcrop_points::{Attributes, Column, Probe, Selection};
+use outcrop_points::{Attributes, Column, Selection};
 use outcrop_stages::order::StoredPoints;
 use std::path::{Path, PathBuf};
 
@@ -138,8 +139,8 @@ impl Known {
     pub fn from_headers(inputs: &[PathBuf], selection: &Selection) -> Option<Self> {
         let mut known = Self::default();
         let mut probes = Vec::new();
-        for path in outcrop_points::expand(inputs).ok()? {
-            let probe = outcrop_points::probe_as(&path, &selection.layout).ok()?;
+        for path in outcrop_formats::expand(inputs).ok()? {
+            let probe = outcrop_formats::probe_as(&path, &selection.layout).ok()?;
             let points = probe.points_likely;
             known.read += points;
             let values = probe.value_bytes(&selection.attributes);

@@ -61,7 +61,7 @@ struct Identity {
 impl Identity {
     fn of(path: &Path) -> Result<Self> {
         if outcrop_points::is_remote(path) {
-            let version = outcrop_points::version(path)?;
+            let version = outcrop_formats::version(path)?;
             let (seconds, nanoseconds) = version.modified;
             return Ok(Self {
                 path: Name::of(path)?,
@@ -129,7 +129,7 @@ pub(super) struct Manifest {
 impl Manifest {
     /// Makes the manifest of a run; samples every input.
     pub fn of(job: &Reconstruction) -> Result<Self> {
-        let mut files = outcrop_points::expand(&job.inputs)?;
+        let mut files = outcrop_formats::expand(&job.inputs)?;
         // What they say is in the mesh.
         let beside = files.iter().map(|file| outcrop_points::prj_of(file));
         let mut beside: Vec<PathBuf> = beside.filter(|path| path.is_file()).collect();

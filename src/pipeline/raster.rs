@@ -6,6 +6,7 @@ use super::resources::{Resources, resource_setters};
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::Storage;
 use outcrop_disk::workspace::progress::{Cancel, Observer};
+use outcrop_formats::ingest_selected;
 use outcrop_survey::raster::{self, Options, Raster};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -48,7 +49,7 @@ impl Rasterization {
             delivery: None,
         };
         job.run(
-            |workspace| raster::raster(&self.source, &self.options, workspace),
+            |workspace| raster::raster(&self.source, &self.options, ingest_selected, workspace),
             || (),
         )
     }

@@ -2,6 +2,7 @@
 
 use super::builder::open_of;
 use super::close::{check_output, closed};
+use super::compare;
 use super::like::Like;
 use super::mesh_job::MeshJob;
 use super::resources::{Resources, resource_setters};
@@ -14,7 +15,6 @@ use outcrop_codecs::ply_mesh::PlyMesh;
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::progress::{Cancel, Observer};
 use outcrop_disk::workspace::{Storage, Workspace};
-use outcrop_inspect::compare;
 use outcrop_levels::crossed;
 use outcrop_levels::single::{self, Goal, Options, Simplified};
 use std::path::{Path, PathBuf};

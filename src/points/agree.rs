@@ -12,7 +12,7 @@ use outcrop_disk::workspace::progress::Observer;
 impl IngestStats {
     /// Compares the files with each other; returns the well-known text of the system of all, which is `given` if
     /// that is.
-    pub(super) fn compare(
+    pub fn compare(
         &mut self,
         systems: Systems,
         given: Option<&GivenCrs>,

@@ -61,7 +61,7 @@ pub(super) fn open_places(columns: &[Column]) -> Vec<(usize, Scalar)> {
 
 /// Points of a file by their largest colour; merging is commutative.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct Tally {
+pub struct Tally {
     /// Up to 1, but not black.
     one: u64,
     /// Up to 255.
@@ -142,11 +142,7 @@ impl Scale {
 }
 
 /// The scale of a file with these columns, as far as it is known: `tally` is none if the colours were not read.
-pub(super) fn depth_of(
-    columns: &[Column],
-    said: Option<Depth>,
-    tally: Option<&Tally>,
-) -> Option<Depth> {
+pub fn depth_of(columns: &[Column], said: Option<Depth>, tally: Option<&Tally>) -> Option<Depth> {
     let colors = columns.iter().filter(|c| COLORS.contains(&&*c.name));
     let scalars: Vec<Scalar> = colors.map(|c| c.scalar).collect();
     let narrow = scalars.iter().all(|s| is_narrow(*s));

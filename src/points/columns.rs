@@ -5,23 +5,23 @@ use outcrop_ply::Scalar;
 use serde::{Deserialize, Serialize};
 
 /// The colour of a point.
-pub(super) const COLORS: [&str; 3] = ["red", "green", "blue"];
+pub const COLORS: [&str; 3] = ["red", "green", "blue"];
 
 /// The coordinates, which are no columns.
-pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
+pub const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// The strength of the echo.
-pub(super) const INTENSITY: &str = "intensity";
+pub const INTENSITY: &str = "intensity";
 
 /// The class of a point, as in LAS.
-pub(super) const CLASSIFICATION: &str = "classification";
+pub const CLASSIFICATION: &str = "classification";
 
 /// The scanner that saw a point, in files that give positions of scanners: its number in
 /// [`PointFile::scanners`](super::point_format::PointFile::scanners), or [`NO_SCANNER`].
-pub(super) const SCANNER: &str = "scanner";
+pub const SCANNER: &str = "scanner";
 
 /// Of points whose scanner is unknown.
-pub(super) const NO_SCANNER: u16 = u16::MAX;
+pub const NO_SCANNER: u16 = u16::MAX;
 
 /// How far a point moved from where it was measured, in the cloud's unit: of the mesh, not of a file.
 pub(super) const DISPLACEMENT: &str = "displacement";
@@ -78,7 +78,7 @@ pub struct Column {
 
 impl Column {
     /// The column that a file calls `name`.
-    pub(super) fn new(name: &str, scalar: Scalar) -> Self {
+    pub fn new(name: &str, scalar: Scalar) -> Self {
         let name = column_name(name);
         Self { name, scalar }
     }
@@ -98,7 +98,7 @@ impl Column {
 
 /// The name by which a column is known in all formats: in lower case, with `_` for spaces, which PLY has between
 /// words, and without the prefix that CloudCompare writes.
-pub(super) fn usual_name(name: &str) -> String {
+pub fn usual_name(name: &str) -> String {
     let lower = name.to_ascii_lowercase();
     let words = lower.split(|c: char| c.is_whitespace() || c.is_control());
     let words: Vec<&str> = words.filter(|word| !word.is_empty()).collect();
@@ -118,7 +118,7 @@ fn column_name(name: &str) -> String {
 }
 
 /// The name of a column whose own is taken.
-pub(super) fn extra(name: &str) -> String {
+pub fn extra(name: &str) -> String {
     format!("extra_{name}")
 }
 
@@ -163,7 +163,7 @@ impl Attributes {
     }
 
     /// Numbers of the wanted columns among those of a file. Of columns with the same name the first counts.
-    pub(super) fn of(&self, columns: &[Column]) -> Vec<usize> {
+    pub fn of(&self, columns: &[Column]) -> Vec<usize> {
         let first = |at: usize| columns[..at].iter().all(|c| c.name != columns[at].name);
         let wanted = |at: &usize| self.wants(&columns[*at].name) && first(*at);
         (0..columns.len()).filter(wanted).collect()
@@ -183,7 +183,7 @@ impl Attributes {
 
     /// # Errors
     /// [`Error::Parameter`] if a listed column is in none of the files, whose columns are `present`.
-    pub(super) fn check(&self, present: &[Column]) -> Result<()> {
+    pub fn check(&self, present: &[Column]) -> Result<()> {
         let Self::List(_) = self else {
             return Ok(());
         };
@@ -241,26 +241,26 @@ impl std::str::FromStr for Attributes {
 
 /// The wanted columns of one file, as its reader sees them.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Wanted {
+pub struct Wanted {
     /// Numbers of the columns in the file's list, ascending.
-    pub(super) numbers: Vec<usize>,
+    pub numbers: Vec<usize>,
     /// The columns.
-    pub(super) columns: Vec<Column>,
+    pub columns: Vec<Column>,
     /// Byte and type of the class in a row, if points are left out by it.
-    pub(super) class: Option<(usize, Scalar)>,
+    pub class: Option<(usize, Scalar)>,
 }
 
 /// What is read beside the columns for the mesh.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Also {
+pub struct Also {
     /// The column of scanners.
-    pub(super) scanners: bool,
+    pub scanners: bool,
     /// Those of normals.
-    pub(super) normals: bool,
+    pub normals: bool,
     /// That of classes, for leaving out points.
-    pub(super) classes: bool,
+    pub classes: bool,
     /// Colours whose scale only their numbers tell.
-    pub(super) depths: bool,
+    pub depths: bool,
 }
 
 impl Wanted {
@@ -268,7 +268,7 @@ impl Wanted {
     ///
     /// # Errors
     /// [`Error::Parameter`] if those for the mesh take more than [`MOST_BYTES`].
-    pub(super) fn of(attributes: &Attributes, columns: &[Column], also: Also) -> Result<Self> {
+    pub fn of(attributes: &Attributes, columns: &[Column], also: Also) -> Result<Self> {
         let mut numbers = attributes.of(columns);
         let bytes: usize = numbers.iter().map(|n| columns[*n].scalar.bytes()).sum();
         let number = |name: &str| columns.iter().position(|c| c.name == name);
@@ -299,7 +299,7 @@ impl Wanted {
     }
 
     /// The columns as they are, when the points were read: those that none of them has have no name.
-    pub(super) fn found(&self, found: &[Column]) -> Vec<Column> {
+    pub fn found(&self, found: &[Column]) -> Vec<Column> {
         let mut columns = self.columns.clone();
         let absent = |column: &&mut Column| found.iter().all(|f| f.name != column.name);
         columns
@@ -321,7 +321,7 @@ impl Wanted {
 }
 
 /// Numbers of the columns of a normal; of several with the same name the first counts.
-pub(super) fn normal_columns(columns: &[Column]) -> Option<[usize; 3]> {
+pub fn normal_columns(columns: &[Column]) -> Option<[usize; 3]> {
     let number = |name: &str| columns.iter().position(|c| c.name == name);
     NORMALS.iter().find_map(|names| {
         let [x, y, z] = names.map(number);
@@ -336,7 +336,7 @@ pub(super) fn row_bytes(columns: &[Column]) -> usize {
 
 /// Smallest and largest value of a column; merging is commutative.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(super) struct Span {
+pub struct Span {
     pub(super) min: f64,
     pub(super) max: f64,
 }

@@ -1,7 +1,7 @@
 //! Coordinates as files store them.
 
 /// A coordinate as a file stores it.
-pub(super) trait Coordinate: bytemuck::Pod + PartialEq + Into<f64> {
+pub trait Coordinate: bytemuck::Pod + PartialEq + Into<f64> {
     /// True for floating-point numbers.
     const FLOATING: bool = true;
     /// False for infinity and NaN.

@@ -1,10 +1,9 @@
 //! Selection of points by position: those in a region or within a margin around it.
 
 use super::native::Native;
-use super::reads::Means;
 use super::source::Source;
 use outcrop_disk::error::{Error, Result};
-use outcrop_disk::workspace::memory::Reservation;
+use outcrop_disk::workspace::memory::{MemoryPool, Reservation};
 use outcrop_geom::boxes::BoxTree;
 use outcrop_geom::region::{Area, Region};
 
@@ -22,7 +21,7 @@ impl Crop {
     ///
     /// # Errors
     /// [`Error::Outside`] if some were left out because of their position.
-    pub(super) fn check_met(&self, sources: &[Source]) -> Result<()> {
+    pub fn check_met(&self, sources: &[Source]) -> Result<()> {
         let mut boxes = sources.iter().filter_map(Source::whole_bounds);
         let Some(mut all) = boxes.next() else {
             return Ok(());
@@ -44,28 +43,32 @@ impl Crop {
 
 /// A crop prepared for tests of points.
 #[derive(Debug)]
-pub(super) struct Nearby<'a> {
+pub struct Nearby<'a> {
     area: Area<'a>,
     margin: f64,
     _held: Reservation,
 }
 
 impl<'a> Nearby<'a> {
-    pub(super) fn of(crop: &'a Crop, means: Means<'_>) -> Result<Self> {
+    /// The same crop, with its outline in memory.
+    ///
+    /// # Errors
+    /// [`Error::Memory`] if the outline does not fit into the budget.
+    pub fn of(crop: &'a Crop, memory: &MemoryPool) -> Result<Self> {
         Ok(Self {
-            _held: means.reserve("crop: outline", crop.region.area_bytes())?,
+            _held: memory.reserve("crop: outline", crop.region.area_bytes())?,
             area: crop.region.area(),
             margin: crop.margin,
         })
     }
 
     /// False only if no point of a box is wanted.
-    pub(super) fn may_meet(&self, bounds: [[f64; 3]; 2]) -> bool {
+    pub fn may_meet(&self, bounds: [[f64; 3]; 2]) -> bool {
         self.area.may_meet(bounds, self.margin)
     }
 
     /// Those of `boxes` that may have a wanted point, found by a tree of them.
-    pub(super) fn meeting(&self, boxes: &[[[f64; 3]; 2]]) -> Vec<usize> {
+    pub fn meeting(&self, boxes: &[[[f64; 3]; 2]]) -> Vec<usize> {
         let tree = BoxTree::of(boxes.iter().copied());
         let [min, max] = self.area.region().bounds();
         let low = [min[0] - self.margin, min[1] - self.margin, f64::MIN];

@@ -65,15 +65,15 @@ pub struct Crs {
     pub height_unit: Option<f64>,
     /// The well-known text, if it was given by one; at most 1 MiB.
     #[serde(skip)]
-    pub(super) wkt: Option<String>,
+    pub wkt: Option<String>,
     /// The record without the parts that may differ between records of the same meaning.
     #[serde(skip)]
-    pub(super) normal: String,
+    pub normal: String,
 }
 
 impl Crs {
     /// A system of which no more is known than this.
-    pub(super) fn named(
+    pub fn named(
         name: String,
         horizontal: Option<u32>,
         vertical: Option<u32>,
@@ -93,7 +93,7 @@ impl Crs {
     }
 
     /// True if the two systems are certainly different.
-    pub(super) fn differs(&self, other: &Self) -> bool {
+    pub fn differs(&self, other: &Self) -> bool {
         match (self.horizontal, other.horizontal) {
             (Some(a), Some(b)) => {
                 let heights = self.vertical.zip(other.vertical);

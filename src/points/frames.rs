@@ -27,7 +27,7 @@ pub(super) const HEADER: usize = 16;
 
 /// A frame of the spool.
 #[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
-pub(super) struct Frame {
+pub struct Frame {
     /// The segment of the file.
     pub(super) segment: u32,
     /// Offset in the segment.
@@ -41,7 +41,7 @@ pub(super) struct Frame {
 }
 
 /// The name of the file with the values of the spool `name`.
-pub(super) fn values_of(name: &str) -> String {
+pub fn values_of(name: &str) -> String {
     format!("{name}.values")
 }
 

@@ -51,7 +51,7 @@ const NAMES: [(f64, &str); 4] = [
 const SAME: f64 = 1e-7;
 
 /// Metres in the unit of length with this EPSG code.
-pub(super) fn length_of_code(code: u32) -> Option<f64> {
+pub fn length_of_code(code: u32) -> Option<f64> {
     let known = LENGTHS.iter().find(|(known, _)| *known == code);
     known.map(|(_, length)| *length)
 }

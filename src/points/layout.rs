@@ -18,7 +18,7 @@ pub struct Layout {
 
 impl Layout {
     /// True if nothing is said.
-    pub(super) fn is_default(&self) -> bool {
+    pub fn is_default(&self) -> bool {
         *self == Self::default()
     }
 }
@@ -31,7 +31,7 @@ impl TextColumns {
     }
 
     /// The columns of x, y and z.
-    pub(super) fn axes(&self) -> [usize; 3] {
+    pub fn axes(&self) -> [usize; 3] {
         let place = |axis| self.0.iter().position(|name| name == axis);
         ["x", "y", "z"].map(|axis| place(axis).unwrap_or(usize::MAX))
     }

@@ -1,81 +1,54 @@
-//! Reads the input formats and converts points to lattice positions.
+//! Point clouds in bounded memory: all points in one scratch file, with what is known of them.
 //!
-//! [`ingest`] decodes every input once into a [`Spool`]: one scratch file with all points in their native
-//! precision, and exact statistics of each file. [`Spool::choose_lattice`] then finds a common lattice, and
-//! [`Spool::for_each`] streams the points as positions on it.
-//!
-//! Formats are detected by content: LAS 1.0 to 1.4 with point formats 0 to 10, LAZ (COPC included), E57,
-//! PLY, PCD, PTX, OFF, and text with one point in a line; any of them may be compressed with gzip or Zstandard, or
-//! the only cloud of a ZIP archive. Each format is a module that implements `PointFormat`, and an entry of the list in
-//! `formats.rs`.
+//! A reader of files fills a [`Spool`] by [`spool::SourceWriter`]: all points in their native precision, and exact
+//! statistics of each file. [`Spool::choose_lattice`] then finds a common lattice, and [`Spool::for_each`] streams the
+//! points as positions on it. The readers are a crate on top of this one, `outcrop-formats`: what computes on points
+//! knows no format and no server.
 
 mod agree;
 mod belong;
 mod carry;
 mod classes;
-mod colors;
-mod columns;
+pub mod colors;
+pub mod columns;
 mod comments;
-mod contain;
-mod coordinate;
-mod crop;
+pub mod coordinate;
+pub mod crop;
 mod crs;
 mod directions;
-mod e57;
-mod ept;
-mod expand;
 mod far;
-mod folder;
-mod foreign;
 mod format;
-mod formats;
-mod frames;
+pub mod frames;
 mod given;
-mod input;
-mod kind;
-mod las;
+pub mod kind;
 mod lattice;
 mod layout;
-mod lines;
 mod map;
 mod middle;
-mod native;
+pub mod native;
 mod normals;
-mod number;
-mod off;
-mod pcd;
-mod ply;
-mod point_format;
+pub mod number;
 mod precision;
 mod prj;
-mod probe;
-mod ptx;
 mod ranks;
-mod reading;
-mod reads;
 mod remote;
 mod same;
-mod scalar;
-mod source;
-mod spool;
+pub mod source;
+pub mod spool;
 mod stats;
 mod stream;
-mod systems;
-mod taken;
-mod text;
+pub mod systems;
 mod units;
-mod wkt;
+pub mod wkt;
 
 pub use carry::{Attribute, Carried};
 pub use classes::Classes;
 pub use colors::Depth;
 pub use colors::depths_shown;
 pub use columns::{Attributes, Column};
-pub use contain::hide_caught_panics;
 pub use crop::Crop;
 pub use crs::{Crs, CrsSource};
 pub use directions::{NORMAL_BYTES, direction};
-pub use expand::expand;
 pub use format::Format;
 pub use given::GivenCrs;
 pub use kind::CrsKind;
@@ -83,24 +56,19 @@ pub use layout::{Layout, TextColumns};
 pub use precision::CoordinateType;
 pub use precision::enough_for;
 pub use prj::{of_prj, prj_of};
-pub use probe::{Probe, probe, probe_as, probe_near};
-pub use reads::Reads;
-pub use remote::{Fetched, Version, is_remote, version};
-pub use stats::{FileStats, IngestStats, LeftOut};
+pub use remote::{Fetched, is_remote};
+pub use stats::{FileStats, IngestStats, LeftOut, SourceStats};
 pub use stream::{READ_BUFFERS, VALUE_BUFFERS};
 pub use systems::Mixed;
 
 use columns::row_bytes;
 use frames::{Frame, values_of};
-use input::Input;
-use outcrop_disk::error::{Error, Result};
+use outcrop_disk::error::Result;
 use outcrop_disk::workspace::Workspace;
 use outcrop_geom::lattice::Lattice;
-use reading::{Opened, read_all};
 use serde::{Deserialize, Serialize};
 use source::Source;
 use std::path::PathBuf;
-use systems::Systems;
 
 /// The points that are read.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -137,95 +105,39 @@ pub struct Spool {
     wkt: Option<String>,
 }
 
-/// Decodes all inputs, which may be files and folders, into a spool.
-///
-/// Progress is reported to the observer; the caller begins and ends the stage. Memory is reserved for each
-/// unit of work, a few MiB for each thread.
-///
-/// # Errors
-/// [`outcrop_disk::error::Error::Input`] for a file that is not what it claims to be; [`outcrop_disk::error::Error::Io`],
-/// [`outcrop_disk::error::Error::Disk`], [`outcrop_disk::error::Error::Memory`], [`outcrop_disk::error::Error::Cancelled`].
-pub fn ingest(inputs: &[PathBuf], workspace: &Workspace) -> Result<Spool> {
-    ingest_selected(inputs, &Selection::default(), workspace)
-}
-
-/// As [`ingest`], but reads only what is selected.
-///
-/// # Errors
-/// See [`ingest`]; [`outcrop_disk::error::Error::Parameter`] for columns that no file has.
-pub fn ingest_selected(
-    inputs: &[PathBuf],
-    selection: &Selection,
-    workspace: &Workspace,
-) -> Result<Spool> {
-    let expanded = expand::expanded(inputs)?;
-    let paths = &expanded.files;
-    check_columns(paths, selection)?;
-    let name = format!("ingest-{}.spool", workspace.number());
-    let mut stats = IngestStats::default();
-    let spool = read_all(paths, selection, &name, &mut stats, workspace).map(|mut spool| {
-        let said = expanded.warning();
-        spool.stats.warnings.splice(0..0, said);
-        spool.stats.left_out = expanded.left_out;
-        spool
-    });
-    if let Err(Error::Input { .. } | Error::Parameter { .. }) = spool
-        && !workspace.is_task()
-    {
-        // They may explain the error.
-        let warnings = stats.warnings.iter();
-        warnings.for_each(|w| workspace.observer.warn(w));
-    }
-    if spool.is_err() && !workspace.is_resumable() {
-        workspace.files.release(&name)?;
-        workspace.files.release(&values_of(&name))?;
-    }
-    spool
-}
-
-/// Refuses columns that are in none of the files.
-fn check_columns(paths: &[PathBuf], selection: &Selection) -> Result<()> {
-    let attributes = &selection.attributes;
-    if !matches!(attributes, Attributes::List(_)) {
-        return Ok(());
-    }
-    let mut present = Vec::new();
-    for path in paths {
-        let probe = probe_as(path, &selection.layout)?;
-        if !probe.is_described {
-            // Checked when all files were read.
-            return Ok(());
-        }
-        present.extend(probe.columns);
-    }
-    attributes.check(&present)
-}
-
-/// Checks that the headers of all files give one reference system. Files that cannot be read are passed over:
-/// their error comes when they are read.
-///
-/// # Errors
-/// [`Error::Input`] with two files whose systems are different.
-pub fn check_systems(inputs: &[PathBuf]) -> Result<()> {
-    let mut systems = Systems::default();
-    for path in expand(inputs)? {
-        let head = Input::open_head(&path, &formats::is_cloud, formats::LONG_HEAD);
-        let opened = head.and_then(|input| Opened::new(input, &Layout::default()));
-        if let Some(crs) = opened.ok().and_then(|opened| opened.crs().0) {
-            systems.add(&path, crs);
-        }
-    }
-    match systems.common() {
-        Ok(_) => Ok(()),
-        Err(mixed) => Err(mixed.refused()),
-    }
-}
+/// Reads what is selected of files and folders of clouds into a spool, as `outcrop_formats::ingest_selected` does: for
+/// those that need points of files, and know no formats.
+pub type Ingest = fn(&[PathBuf], &Selection, &Workspace) -> Result<Spool>;
 
 impl Spool {
+    /// The spool `name`, as it was written: its frames and those of values, of these sources.
+    #[must_use]
+    pub fn of(
+        name: &str,
+        (frames, values): (Vec<Frame>, Vec<Frame>),
+        sources: Vec<Source>,
+        stats: IngestStats,
+        wkt: Option<String>,
+    ) -> Self {
+        Self {
+            name: name.to_owned(),
+            frames,
+            values,
+            sources,
+            stats,
+            wkt,
+        }
+    }
+
     /// Counts and extents of the input.
     #[must_use]
     pub fn stats(&self) -> &IngestStats {
         &self.stats
+    }
+
+    /// The same, for what is known of the files beside their points.
+    pub fn stats_mut(&mut self) -> &mut IngestStats {
+        &mut self.stats
     }
 
     /// The well-known text of the reference system, if it was given by one; at most 1 MiB.

@@ -4,9 +4,14 @@ use serde::{Deserialize, Serialize};
 
 /// The type of a source's coordinates in the spool.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(super) enum Native {
+pub enum Native {
     /// Integers; the coordinate is `i * scale + offset`.
-    Las { scale: [f64; 3], offset: [f64; 3] },
+    Las {
+        /// Step of each axis.
+        scale: [f64; 3],
+        /// Coordinates of the integers 0.
+        offset: [f64; 3],
+    },
     /// Single precision.
     F32,
     /// Double precision.
@@ -15,7 +20,8 @@ pub(super) enum Native {
 
 impl Native {
     /// Bytes of one point in the spool.
-    pub(super) fn point_bytes(&self) -> usize {
+    #[must_use]
+    pub fn point_bytes(&self) -> usize {
         match self {
             Self::Las { .. } => size_of::<[i32; 3]>(),
             Self::F32 => size_of::<[f32; 3]>(),

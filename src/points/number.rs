@@ -1,11 +1,11 @@
 //! Numbers in text.
 
 /// Stands for the number of decimals of a number with an exponent.
-pub(super) const NOT_FIXED: u32 = u32::MAX;
+pub const NOT_FIXED: u32 = u32::MAX;
 
 /// Parses a number; raises `decimals` to its number of decimals, or to [`NOT_FIXED`] if it has an exponent.
 /// Words for infinity and NaN are accepted.
-pub(super) fn parse(token: &[u8], decimal_comma: bool, decimals: &mut u32) -> Option<f64> {
+pub fn parse(token: &[u8], decimal_comma: bool, decimals: &mut u32) -> Option<f64> {
     let mut copy = [0u8; 64];
     let token = if decimal_comma {
         // Longer tokens are not numbers.

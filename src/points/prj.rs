@@ -1,7 +1,6 @@
 //! Reference systems in `.prj` files beside others.
 
 use super::crs::{Crs, CrsSource, LONGEST};
-use super::input::Input;
 use super::wkt::well_known;
 use outcrop_disk::workspace::compressed::plain_name;
 use std::fs::File;
@@ -12,11 +11,6 @@ use std::path::{Path, PathBuf};
 #[must_use]
 pub fn prj_of(input: &Path) -> PathBuf {
     plain_name(input).with_extension("prj")
-}
-
-/// The reference system in the `.prj` file beside an input, if there is one; a warning if it cannot be used.
-pub(super) fn beside(input: &Input) -> (Option<Crs>, Option<String>) {
-    of_prj(&prj_of(&input.path))
 }
 
 /// The reference system in a `.prj` file, if there is one; a warning if it cannot be used.

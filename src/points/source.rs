@@ -9,20 +9,23 @@ use serde::{Deserialize, Serialize};
 
 /// The points of one input file in the spool.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(super) struct Source {
-    pub(super) native: Native,
-    pub(super) stats: SourceStats,
+pub struct Source {
+    /// The type of its coordinates.
+    pub native: Native,
+    /// Its counts and extents.
+    pub stats: SourceStats,
     /// True if the numbers come from text, so that a fixed number of decimals gives a lattice.
-    pub(super) text: bool,
+    pub text: bool,
     /// True if points outside the box of `stats` are left out.
-    pub(super) cut: bool,
-    /// The columns whose values are in the spool, and their spans.
-    pub(super) columns: Vec<Column>,
-    pub(super) spans: Vec<Span>,
+    pub cut: bool,
+    /// The columns whose values are in the spool.
+    pub columns: Vec<Column>,
+    /// Their spans.
+    pub spans: Vec<Span>,
     /// The scale of its colours, if the file says it.
-    pub(super) depth: Option<Depth>,
+    pub depth: Option<Depth>,
     /// Its points by their largest colour, if colours were read.
-    pub(super) tally: Tally,
+    pub tally: Tally,
 }
 
 impl Source {
@@ -42,7 +45,8 @@ impl Source {
     }
 
     /// True if colours are among the values in the spool.
-    pub(super) fn reads_colors(&self) -> bool {
+    #[must_use]
+    pub fn reads_colors(&self) -> bool {
         self.columns.iter().any(|c| COLORS.contains(&&*c.name))
     }
 
@@ -58,7 +62,8 @@ impl Source {
     }
 
     /// Lowest and highest coordinates of the kept points in the input's unit; `None` without points.
-    pub(super) fn bounds(&self) -> Option<[[f64; 3]; 2]> {
+    #[must_use]
+    pub fn bounds(&self) -> Option<[[f64; 3]; 2]> {
         (self.stats.kept > 0).then(|| self.in_unit(self.stats.own))
     }
 

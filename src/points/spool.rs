@@ -20,28 +20,32 @@ use std::sync::{Arc, Mutex};
 
 /// The values of one source or of a part of it: their frames, the span of each column, and the colours.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
-pub(super) struct Values {
-    pub(super) frames: Vec<Frame>,
-    pub(super) spans: Vec<Span>,
-    pub(super) tally: Tally,
+pub struct Values {
+    /// Where they are in the file.
+    pub frames: Vec<Frame>,
+    /// Smallest and largest value of each column.
+    pub spans: Vec<Span>,
+    /// The points by their largest colour.
+    pub tally: Tally,
 }
 
 /// The result of a unit: its counts, its frames, and its values.
 pub(super) type Taken = (SourceStats, Vec<Frame>, Values);
 
 /// Receives the points of one source, from several threads.
-pub(super) struct SourceWriter<'a> {
-    pub(super) workspace: &'a Workspace,
+pub struct SourceWriter<'a> {
+    /// Where it writes.
+    pub workspace: &'a Workspace,
     file: Arc<ScratchFile>,
     /// The file of values, if columns are wanted.
     values: Option<Arc<ScratchFile>>,
     source: u32,
     /// The classes to keep, if points have a class.
-    pub(super) classes: &'a Classes,
+    pub classes: &'a Classes,
     /// The positions to keep, and the type of the source's coordinates.
     nearby: Option<(&'a Nearby<'a>, Native)>,
     /// The columns to read.
-    pub(super) wanted: &'a Wanted,
+    pub wanted: &'a Wanted,
     /// Places of the colours whose scale is not known.
     colors: Vec<(usize, Scalar)>,
     /// The section of the next unit.
@@ -53,7 +57,10 @@ pub(super) struct SourceWriter<'a> {
 
 impl<'a> SourceWriter<'a> {
     /// A writer whose units are the sections from `first` on of the spool `name`.
-    pub(super) fn new(
+    ///
+    /// # Errors
+    /// [`outcrop_disk::error::Error::Io`] if the scratch file cannot be opened.
+    pub fn new(
         workspace: &'a Workspace,
         name: &str,
         first: u32,
@@ -78,18 +85,18 @@ impl<'a> SourceWriter<'a> {
     }
 
     /// The same, for points at wanted positions only; coordinates are of type `native`.
-    pub(super) fn within(self, nearby: Option<&'a Nearby<'a>>, native: Native) -> Self {
+    pub fn within(self, nearby: Option<&'a Nearby<'a>>, native: Native) -> Self {
         let nearby = nearby.map(|nearby| (nearby, native));
         Self { nearby, ..self }
     }
 
     /// The wanted positions, if not all are.
-    pub(super) fn region(&self) -> Option<&'a Nearby<'a>> {
+    pub fn region(&self) -> Option<&'a Nearby<'a>> {
         self.nearby.map(|(nearby, _)| nearby)
     }
 
     /// Counts points that are not read because of their position; their coordinates are between these ends.
-    pub(super) fn skip(&self, points: u64, [low, high]: [[f64; 3]; 2]) {
+    pub fn skip(&self, points: u64, [low, high]: [[f64; 3]; 2]) {
         let mut stats = lock(&self.stats);
         stats.skipped += points;
         stats.reach_point(low);
@@ -115,12 +122,16 @@ impl<'a> SourceWriter<'a> {
     }
 
     /// The name of a step of this source.
-    pub(super) fn step(&self, name: &str) -> String {
+    pub fn step(&self, name: &str) -> String {
         format!("{name} of source {}", self.source)
     }
 
     /// Reads units of the source on all threads, as [`Workspace::units`]; `work` fills a sink for each.
-    pub(super) fn units<T: Coordinate>(
+    ///
+    /// # Errors
+    /// Those of `work`; [`outcrop_disk::error::Error::Disk`], [`outcrop_disk::error::Error::Memory`],
+    /// [`outcrop_disk::error::Error::Cancelled`].
+    pub fn units<T: Coordinate>(
         &self,
         name: &'static str,
         count: usize,
@@ -145,7 +156,10 @@ impl<'a> SourceWriter<'a> {
     }
 
     /// Reads the source as one unit that takes `bytes` of memory.
-    pub(super) fn whole<T: Coordinate>(
+    ///
+    /// # Errors
+    /// See [`SourceWriter::units`].
+    pub fn whole<T: Coordinate>(
         &self,
         name: &'static str,
         bytes: u64,
@@ -155,12 +169,12 @@ impl<'a> SourceWriter<'a> {
     }
 
     /// Statistics of the finished units.
-    pub(super) fn stats(&self) -> SourceStats {
+    pub fn stats(&self) -> SourceStats {
         *lock(&self.stats)
     }
 
     /// The section after those of the source, and all frames and values in the order of units.
-    pub(super) fn end(self) -> (u32, Vec<Frame>, Values) {
+    pub fn end(self) -> (u32, Vec<Frame>, Values) {
         let mut all = (Vec::new(), Values::default());
         all.1.spans = vec![Span::default(); self.wanted.columns.len()];
         for (frames, values) in std::mem::take(&mut *lock(&self.frames)).into_values() {
@@ -176,12 +190,12 @@ impl<'a> SourceWriter<'a> {
 }
 
 /// Bytes of one [`Sink`].
-pub(super) const fn sink_bytes<T>() -> u64 {
+pub const fn sink_bytes<T>() -> u64 {
     (HEADER + 2 * FRAME * size_of::<[T; 3]>()) as u64
 }
 
 /// Collects points of one source into frames.
-pub(super) struct Sink<'a, T: Coordinate> {
+pub struct Sink<'a, T: Coordinate> {
     target: &'a SourceWriter<'a>,
     unit: &'a Unit<'a>,
     frames: FrameWriter<'a>,
@@ -189,19 +203,18 @@ pub(super) struct Sink<'a, T: Coordinate> {
     /// The values of the points, the span of each column, and the colours, if columns are wanted.
     values: Option<(FrameWriter<'a>, Vec<Span>, Tally)>,
     /// Statistics so far; extents and kept points are added when a frame is full.
-    pub(super) stats: SourceStats,
+    pub stats: SourceStats,
     reported: u64,
 }
 
 impl<T: Coordinate> Sink<'_, T> {
     /// Adds a point, unless a coordinate is not finite. `values` appends the values of the wanted columns, in
     /// their order and in little-endian bytes; it is called only if columns are wanted.
+    ///
+    /// # Errors
+    /// Those of a full frame that is written.
     #[inline]
-    pub(super) fn push_with(
-        &mut self,
-        point: [T; 3],
-        values: impl FnOnce(&mut Vec<u8>),
-    ) -> Result<()> {
+    pub fn push_with(&mut self, point: [T; 3], values: impl FnOnce(&mut Vec<u8>)) -> Result<()> {
         self.stats.read += 1;
         if !point.iter().all(|c| c.is_finite()) {
             self.stats.dropped += 1;
@@ -265,21 +278,21 @@ impl<T: Coordinate> Sink<'_, T> {
 
     /// Counts a point that is flagged as withheld.
     #[inline]
-    pub(super) fn withhold(&mut self) {
+    pub fn withhold(&mut self) {
         self.stats.read += 1;
         self.stats.withheld += 1;
     }
 
     /// Counts a record that the scanner marked as no point.
     #[inline]
-    pub(super) fn invalid(&mut self) {
+    pub fn invalid(&mut self) {
         self.stats.read += 1;
         self.stats.invalid += 1;
     }
 
     /// Counts a point whose class is not wanted.
     #[inline]
-    pub(super) fn leave_out(&mut self) {
+    pub fn leave_out(&mut self) {
         self.stats.read += 1;
         self.stats.unwanted += 1;
     }

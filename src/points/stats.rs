@@ -113,33 +113,37 @@ pub struct FileStats {
 
 /// Exact statistics of one source, in its native form; merging is commutative.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(super) struct SourceStats {
-    pub(super) read: u64,
-    pub(super) kept: u64,
-    pub(super) dropped: u64,
-    pub(super) withheld: u64,
+pub struct SourceStats {
+    /// Points in the file.
+    pub read: u64,
+    /// Points in the spool.
+    pub kept: u64,
+    /// Points left out because a coordinate is infinite or NaN.
+    pub dropped: u64,
+    /// Points left out because they are flagged as withheld.
+    pub withheld: u64,
     /// Records that the scanner marked as no point.
-    pub(super) invalid: u64,
+    pub invalid: u64,
     /// Points left out because of their class.
-    pub(super) unwanted: u64,
+    pub unwanted: u64,
     /// Points left out because of their position.
-    pub(super) outside: u64,
+    pub outside: u64,
     /// Points not decoded because of their position, by the header or the chunk table.
-    pub(super) skipped: u64,
+    pub skipped: u64,
     /// Lowest coordinates, also of points left out because of their position.
-    pub(super) min: [f64; 3],
+    pub min: [f64; 3],
     /// Highest coordinates, likewise.
-    pub(super) max: [f64; 3],
+    pub max: [f64; 3],
     /// Lowest and highest coordinates of the kept points.
-    pub(super) own: [[f64; 3]; 2],
+    pub own: [[f64; 3]; 2],
     /// All coordinates are multiples of 2 to the power of this; `i32::MAX` if all are zero.
-    pub(super) exponent: i32,
+    pub exponent: i32,
     /// Largest number of decimals in text, or [`NOT_FIXED`](super::number::NOT_FIXED).
-    pub(super) decimals: u32,
+    pub decimals: u32,
     /// Sum of the point counts given in count lines of a text file.
-    pub(super) claimed: u64,
+    pub claimed: u64,
     /// What lines of a PTX file have, as bits.
-    pub(super) kinds: u8,
+    pub kinds: u8,
 }
 
 /// The extent of no point.

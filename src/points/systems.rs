@@ -44,14 +44,14 @@ impl Mixed {
 /// The reference systems of several files: one of each kind that may be the same as the others, so that few
 /// texts are in memory.
 #[derive(Debug, Default)]
-pub(super) struct Systems {
+pub struct Systems {
     known: Vec<(PathBuf, Crs)>,
     mixed: Option<Mixed>,
 }
 
 impl Systems {
     /// Takes the system of a file.
-    pub(super) fn add(&mut self, path: &Path, crs: Crs) {
+    pub fn add(&mut self, path: &Path, crs: Crs) {
         if self.mixed.is_some() {
             return;
         }
@@ -69,8 +69,11 @@ impl Systems {
         }
     }
 
-    /// The system that tells most; two files if theirs are different.
-    pub(super) fn common(self) -> Result<Option<Crs>, Mixed> {
+    /// The system that tells most.
+    ///
+    /// # Errors
+    /// Two files, if theirs are different.
+    pub fn common(self) -> Result<Option<Crs>, Mixed> {
         match self.mixed {
             Some(mixed) => Err(mixed),
             None => {

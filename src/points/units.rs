@@ -8,7 +8,7 @@ use outcrop_disk::workspace::progress::Observer;
 
 impl Crs {
     /// The same, with the kind and the units that follow from the codes where the record does not tell them.
-    pub(super) fn completed(mut self) -> Self {
+    pub fn completed(mut self) -> Self {
         if let Some((kind, unit)) = self.horizontal.and_then(of_code) {
             self.kind = self.kind.or(Some(kind));
             if self.kind == Some(kind) {

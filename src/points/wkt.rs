@@ -7,7 +7,7 @@ use super::kind::CrsKind;
 const DEEPEST: usize = 32;
 
 /// The system described by a well-known text.
-pub(crate) fn well_known(text: &str) -> Crs {
+pub fn well_known(text: &str) -> Crs {
     let mut crs = Crs {
         wkt: (text.len() <= LONGEST).then(|| text.to_owned()),
         normal: String::with_capacity(text.len()),

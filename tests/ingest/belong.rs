@@ -2,7 +2,8 @@
 
 use crate::bench::{Bench, cloud, write_las};
 use outcrop_disk::error::{Remedy, Setting};
-use outcrop_points::{CrsSource, check_systems};
+use outcrop_formats::check_systems;
+use outcrop_points::CrsSource;
 use std::path::{Path, PathBuf};
 
 /// A file with these records of its reference system.

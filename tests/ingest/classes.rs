@@ -5,7 +5,8 @@ use crate::columns::rows;
 use crate::formats::e57::{Scan, cartesian, edited};
 use crate::formats::pcd;
 use e57::{Record, RecordDataType, RecordName, RecordValue};
-use outcrop_points::{Classes, Crop, Selection, Spool, ingest_selected};
+use outcrop_formats::ingest_selected;
+use outcrop_points::{Classes, Crop, Selection, Spool};
 use std::path::{Path, PathBuf};
 
 /// Point `i` has class `i % 19`; every hundredth is withheld.

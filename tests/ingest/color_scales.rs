@@ -4,7 +4,8 @@ use crate::bench::Bench;
 use crate::columns::{read, rows};
 use crate::formats::e57::{Scan, cartesian, edited};
 use e57::{Record, RecordDataType, RecordName, RecordValue};
-use outcrop_points::{Depth, Selection, ingest_selected};
+use outcrop_formats::ingest_selected;
+use outcrop_points::{Depth, Selection};
 use proptest::prelude::*;
 use std::path::{Path, PathBuf};
 

@@ -2,8 +2,9 @@
 
 use super::bench::{Bench, cloud, write_las};
 use outcrop::Error;
+use outcrop_formats::{ingest_selected, probe};
 use outcrop_geom::Point;
-use outcrop_points::{Attributes, Carried, Selection, Spool, ingest_selected, probe};
+use outcrop_points::{Attributes, Carried, Selection, Spool};
 use std::path::{Path, PathBuf};
 
 fn selection(list: &str) -> Selection {

@@ -1,7 +1,8 @@
 //! What of a folder is read, and what is left out by name.
 
 use crate::bench::{Bench, cloud, write_las};
-use outcrop_points::{Spool, expand};
+use outcrop_formats::expand;
+use outcrop_points::Spool;
 use std::path::PathBuf;
 
 const MATRIX: &str = "1 0 0 50\n0 1 0 0\n0 0 1 20\n0 0 0 1\n";

@@ -28,7 +28,8 @@ mod urls;
 
 use bench::{Bench, based, cloud, ply, positions, write_las};
 use outcrop::Error;
-use outcrop_points::{CoordinateType, Format, expand, probe};
+use outcrop_formats::{expand, probe};
+use outcrop_points::{CoordinateType, Format};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 

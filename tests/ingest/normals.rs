@@ -3,7 +3,8 @@
 use crate::bench::Bench;
 use crate::formats::e57::{cartesian, pose};
 use e57::{E57Writer, Extension, Record, RecordDataType, RecordName, RecordValue};
-use outcrop_points::{Attributes, Selection, direction, ingest_selected, probe};
+use outcrop_formats::{ingest_selected, probe};
+use outcrop_points::{Attributes, Selection, direction};
 use std::path::{Path, PathBuf};
 
 /// The short forms of the normals of three points at 0, 1 and 2 on the x axis.

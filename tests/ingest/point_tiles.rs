@@ -2,7 +2,8 @@
 
 use crate::bench::{Bench, cloud, write_las};
 use crate::regions::{check, points};
-use outcrop_points::{Format, ingest, probe};
+use outcrop_formats::{ingest, probe};
+use outcrop_points::Format;
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -163,7 +164,7 @@ fn of_a_region_only_the_nodes_that_meet_it_are_read() {
         let far = bench.path(data).join("ept-hierarchy/1-1-1-0.json");
         std::fs::remove_file(far).unwrap();
         let near = crate::regions::within("400001,5000001,400002,5000002", 0.5);
-        outcrop_points::ingest_selected(&[ept], &near, &bench.workspace).unwrap();
+        outcrop_formats::ingest_selected(&[ept], &near, &bench.workspace).unwrap();
     }
 }
 

@@ -3,7 +3,8 @@
 use crate::bench::{Bench, cloud, write_las};
 use laz::{LasZipCompressor, LazItemRecordBuilder, LazVlrBuilder};
 use outcrop::Region;
-use outcrop_points::{Classes, Crop, Selection, Spool, ingest, ingest_selected};
+use outcrop_formats::{ingest, ingest_selected};
+use outcrop_points::{Classes, Crop, Selection, Spool};
 use std::io::{Cursor, Seek, SeekFrom};
 use std::path::PathBuf;
 

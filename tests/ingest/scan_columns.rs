@@ -5,7 +5,8 @@ use crate::columns::{read, rows};
 use crate::formats::e57::{Scan, cartesian, scaled, write};
 use crate::formats::{pcd, ptx};
 use e57::{Record, RecordDataType, RecordName, RecordValue};
-use outcrop_points::{Selection, ingest_selected, probe};
+use outcrop_formats::{ingest_selected, probe};
+use outcrop_points::Selection;
 use std::path::Path;
 
 fn names(path: &Path) -> Vec<String> {

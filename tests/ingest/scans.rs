@@ -6,7 +6,8 @@ use crate::formats::e57::{
 };
 use crate::formats::{pcd, ptx};
 use e57::{CartesianCoordinate, E57Reader, RecordDataType};
-use outcrop_points::{CoordinateType, Format, probe};
+use outcrop_formats::probe;
+use outcrop_points::{CoordinateType, Format};
 use std::path::{Path, PathBuf};
 
 #[test]

@@ -7,7 +7,8 @@ use crate::bench::Bench;
 use crate::columns::rows;
 use named::named;
 use outcrop::Error;
-use outcrop_points::{Attributes, IngestStats, Layout, Selection, Spool, ingest_selected};
+use outcrop_formats::ingest_selected;
+use outcrop_points::{Attributes, IngestStats, Layout, Selection, Spool};
 use std::path::PathBuf;
 
 /// Reads a file with these columns of its points.

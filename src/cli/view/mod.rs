@@ -13,6 +13,7 @@ use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::memory::MemoryPool;
 use outcrop_disk::workspace::progress::{Cancel, Observer};
+use outcrop_formats::ingest_selected;
 use outcrop_levels::cloud;
 use outcrop_view::{Part, Server, write_html};
 use scratch::{Scratch, scratch};
@@ -138,7 +139,14 @@ impl Maker<'_> {
         let workspace = Workspace::new(&place, memory, jobs::threads(limits), observer, cancel)?;
         workspace.set_storage(limits.storing.storage())?;
         let folder = place.join("points");
-        let made = cloud::tileset(path, name, &folder, self.args.points_limit, &workspace)?;
+        let made = cloud::tileset(
+            path,
+            name,
+            &folder,
+            self.args.points_limit,
+            ingest_selected,
+            &workspace,
+        )?;
         if limits.quiet.tells() && made.points < made.of_points {
             eprintln!(
                 "outcrop: {name}: {} of {} points are shown, one in each box of at most {}",

@@ -95,10 +95,10 @@ fn source(path: &Path) -> Result<Source<'_>> {
 
 /// An error if a cloud has no file that can be read, as far as the beginning of the first one shows.
 fn readable_cloud(cloud: &Path) -> Result<()> {
-    let files = outcrop_points::expand(&[cloud.to_path_buf()])?;
+    let files = outcrop_formats::expand(&[cloud.to_path_buf()])?;
     files
         .first()
-        .map_or(Ok(()), |file| outcrop_points::probe(file).map(|_| ()))
+        .map_or(Ok(()), |file| outcrop_formats::probe(file).map(|_| ()))
 }
 
 /// The shortest end of one of these paths that none of the others has.

@@ -4,23 +4,24 @@ use super::pages::PageWriter;
 use super::shape::{Items, Kind, Shape, side, unusable, usable};
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::{Unit, Workspace};
-use outcrop_points::ingest;
+use outcrop_points::{Ingest, Selection};
 use outcrop_stages::order::order;
 use std::path::Path;
 
 /// Points per page of the store between ingest and the pages.
 const STORE_PAGE: usize = 1 << 12;
 
-/// Reads a cloud in any format of ingest; duplicates become one point. If there is a unit, the pages survive the attempt.
+/// Reads a cloud by `ingest`; duplicates become one point. If there is a unit, the pages survive the attempt.
 pub(super) fn read(
     path: &Path,
     name: &'static str,
+    ingest: Ingest,
     unit: Option<&Unit<'_>>,
     workspace: &Workspace,
 ) -> Result<Shape> {
     let observer = &workspace.observer;
     observer.begin("read cloud", "points", 0);
-    let spool = ingest(&[path.to_path_buf()], workspace)?;
+    let spool = ingest(&[path.to_path_buf()], &Selection::default(), workspace)?;
     observer.end();
     let stats = spool.stats();
     stats.warnings.iter().for_each(|w| observer.warn(w));

@@ -45,6 +45,7 @@ use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::{Unit, Workspace};
 #[cfg(feature = "pictures")]
 use outcrop_draw::picture::Picture;
+use outcrop_points::Ingest;
 use samples::Numbers;
 use shape::Shape;
 use std::path::Path;
@@ -72,9 +73,10 @@ pub(crate) fn read_side(
     path: &Path,
     name: &'static str,
     options: &Options,
+    ingest: Ingest,
     workspace: &Workspace,
 ) -> Result<Shape> {
-    read_by(path, name, options, None, workspace)
+    read_by(path, name, options, (ingest, None), workspace)
 }
 
 /// If there is a unit, the pages survive the attempt once it is finished.
@@ -82,13 +84,13 @@ fn read_by(
     path: &Path,
     name: &'static str,
     options: &Options,
-    unit: Option<&Unit<'_>>,
+    (ingest, unit): (Ingest, Option<&Unit<'_>>),
     workspace: &Workspace,
 ) -> Result<Shape> {
     if path.is_file() && holds_faces(path)? {
         mesh::read(path, name, options, unit, workspace)
     } else {
-        cloud::read(path, name, unit, workspace)
+        cloud::read(path, name, ingest, unit, workspace)
     }
 }
 
@@ -96,6 +98,7 @@ fn read_by(
 pub(crate) fn read_side_once(
     path: &Path,
     name: &'static str,
+    ingest: Ingest,
     workspace: &Workspace,
 ) -> Result<Shape> {
     let options = Options {
@@ -103,21 +106,27 @@ pub(crate) fn read_side_once(
         seed: 0,
     };
     let make = |unit: &Unit<'_>| {
-        let shape = read_by(path, name, &options, Some(unit), workspace)?;
+        let shape = read_by(path, name, &options, (ingest, Some(unit)), workspace)?;
         let kept = shape.kept();
         Ok((shape, kept))
     };
     workspace.once_opened(name, make, |kept| kept.open(path, name, workspace))
 }
 
-/// Distances between two shapes, each a mesh (PLY with faces) or a cloud (in any format of ingest).
+/// Distances between two shapes, each a mesh (PLY with faces) or a cloud, which `ingest` reads.
 ///
 /// # Errors
 /// [`Error::Input`] for a file that cannot be read, is empty, or has faces that are not triangles;
 /// [`Error::Parameter`] without samples; [`Error::Io`], [`Error::Corrupt`] from the scratch folder;
 /// [`Error::Memory`] if the free part of the budget is too small; [`Error::Cancelled`].
-pub fn compare(a: &Path, b: &Path, options: &Options, workspace: &Workspace) -> Result<Comparison> {
-    measured(a, b, options, workspace, |_, _, _| Ok(())).map(|(comparison, ())| comparison)
+pub fn compare(
+    both: [&Path; 2],
+    options: &Options,
+    ingest: Ingest,
+    workspace: &Workspace,
+) -> Result<Comparison> {
+    let compared = measured(both, options, ingest, workspace, |_, _, _| Ok(()));
+    compared.map(|(comparison, ())| comparison)
 }
 
 /// As [`compare`], with pictures and distributions for `outcrop::page::comparison`.
@@ -126,13 +135,13 @@ pub fn compare(a: &Path, b: &Path, options: &Options, workspace: &Workspace) -> 
 /// See [`compare`].
 #[cfg(feature = "pictures")]
 pub fn illustrated(
-    a: &Path,
-    b: &Path,
+    both: [&Path; 2],
     options: &Options,
+    ingest: Ingest,
     workspace: &Workspace,
 ) -> Result<(Comparison, Illustration)> {
     let draw = |a: &Shape, b: &Shape, diagonal: f64| Drawing::of(a, b, diagonal, workspace);
-    let (comparison, drawing) = measured(a, b, options, workspace, draw)?;
+    let (comparison, drawing) = measured(both, options, ingest, workspace, draw)?;
     let illustration = drawing.finish(comparison.symmetric.figures.p99, workspace)?;
     Ok((comparison, illustration))
 }
@@ -166,9 +175,9 @@ pub(crate) fn marked(
 
 /// Measures, and shows each distance to the witness that `begin` makes of both sides and their diagonal.
 fn measured<W: Witness>(
-    a: &Path,
-    b: &Path,
+    [a, b]: [&Path; 2],
     options: &Options,
+    ingest: Ingest,
     workspace: &Workspace,
     begin: impl FnOnce(&Shape, &Shape, f64) -> Result<W>,
 ) -> Result<(Comparison, W)> {
@@ -180,8 +189,8 @@ fn measured<W: Witness>(
             expected: "1 or more".into(),
         });
     }
-    let a = read_side(a, "compare.a", options, workspace)?;
-    let b = read_side(b, "compare.b", options, workspace)?;
+    let a = read_side(a, "compare.a", options, ingest, workspace)?;
+    let b = read_side(b, "compare.b", options, ingest, workspace)?;
     let number = Numbers::of(&a, samples).all() + Numbers::of(&b, samples).all();
     let bytes = number * size_of::<DistanceRow>() as u64;
     let buffer = bytes.min(workspace.memory.available() / 8) + (1 << 20);
@@ -234,12 +243,13 @@ pub struct Measured {
 pub fn distances(
     cloud: &Path,
     to: &Path,
+    ingest: Ingest,
     workspace: &Workspace,
     mut each: impl FnMut(Measured) -> Result<()>,
 ) -> Result<u64> {
-    let cloud = cloud::read(cloud, "compare.a", None, workspace)?;
+    let cloud = cloud::read(cloud, "compare.a", ingest, None, workspace)?;
     let options = |samples| Options { samples, seed: 0 };
-    let to = read_side(to, "compare.b", &options(0), workspace)?;
+    let to = read_side(to, "compare.b", &options(0), ingest, workspace)?;
     let mut index = 0;
     let all = options(u64::MAX);
     measure::distances(&cloud, &to, &all, workspace, |sample, distance| {

@@ -6,7 +6,7 @@ mod thinned;
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::Workspace;
 use outcrop_geom::lattice::Lattice;
-use outcrop_points::{Attributes, READ_BUFFERS, Selection, Spool, VALUE_BUFFERS, ingest_selected};
+use outcrop_points::{Attributes, Ingest, READ_BUFFERS, Selection, Spool, VALUE_BUFFERS};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -29,7 +29,7 @@ pub struct CloudReport {
 }
 
 /// Makes the tileset `folder` of at most `most` points of a cloud, a file or folder, which is called `source` in it.
-/// The points are spread evenly over space: one in each box of a grid that is as fine as the limit allows. They do not
+/// `ingest` reads it. The points are spread evenly over space: one in each box of a grid that is as fine as the limit allows. They do not
 /// depend on memory, threads and order of the files.
 ///
 /// # Errors
@@ -40,6 +40,7 @@ pub fn tileset(
     source: &str,
     folder: &Path,
     most: u64,
+    ingest: Ingest,
     workspace: &Workspace,
 ) -> Result<CloudReport> {
     if !(1..=file::MOST).contains(&most) {
@@ -49,7 +50,7 @@ pub fn tileset(
             expected: format!("1 to {}", file::MOST),
         });
     }
-    let spool = read(path, workspace)?;
+    let spool = read(path, ingest, workspace)?;
     let lattice = spool.choose_lattice(0).map_err(|error| match error {
         Error::Degenerate { found } => Error::input(path, "points", found, "smaller ones"),
         other => other,
@@ -71,14 +72,14 @@ pub fn tileset(
 }
 
 /// Reads the cloud with its colours.
-fn read(path: &Path, workspace: &Workspace) -> Result<Spool> {
+fn read(path: &Path, ingest: Ingest, workspace: &Workspace) -> Result<Spool> {
     let observer = &workspace.observer;
     observer.begin("read cloud", "points", 0);
     let selection = Selection {
         attributes: Attributes::Auto,
         ..Selection::default()
     };
-    let spool = ingest_selected(&[path.to_path_buf()], &selection, workspace)?;
+    let spool = ingest(&[path.to_path_buf()], &selection, workspace)?;
     observer.end();
     let stats = spool.stats();
     stats.warnings.iter().for_each(|w| observer.warn(w));

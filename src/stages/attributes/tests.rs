@@ -1,7 +1,8 @@
 use super::*;
 use crate::order::{Rewriter, order};
+use outcrop_formats::ingest_selected;
 use outcrop_geom::Point;
-use outcrop_points::{Selection, ingest_selected};
+use outcrop_points::Selection;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 

@@ -321,7 +321,7 @@ fn sort_in_groups(
 mod tests {
     use super::*;
     use crate::order::order;
-    use outcrop_points::ingest;
+    use outcrop_formats::ingest;
     use std::fmt::Write;
 
     /// Both sorts of a cloud in text, with pages of `page` points.

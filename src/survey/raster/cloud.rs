@@ -7,8 +7,7 @@ use outcrop_disk::workspace::Workspace;
 use outcrop_geom::lattice::Lattice;
 use outcrop_geom::region::Region;
 use outcrop_points::{
-    Attributes, Carried, Classes, Crop, IngestStats, Selection, Spool, VALUE_BUFFERS,
-    ingest_selected,
+    Attributes, Carried, Classes, Crop, Ingest, IngestStats, Selection, Spool, VALUE_BUFFERS,
 };
 use std::path::Path;
 
@@ -27,6 +26,7 @@ impl Cloud {
         path: &Path,
         columns: Columns,
         region: Option<(&Region, f64)>,
+        ingest: Ingest,
         workspace: &Workspace,
     ) -> Result<Self> {
         let names = columns.names().iter().map(|name| (*name).to_owned());
@@ -49,7 +49,7 @@ impl Cloud {
         };
         let observer = &workspace.observer;
         observer.begin("read cloud", "points", 0);
-        let spool = ingest_selected(&[path.to_path_buf()], &selection, workspace)?;
+        let spool = ingest(&[path.to_path_buf()], &selection, workspace)?;
         observer.end();
         let stats = spool.stats();
         stats.warnings.iter().for_each(|line| observer.warn(line));

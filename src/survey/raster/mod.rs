@@ -34,7 +34,7 @@ use outcrop_disk::error::{Error, Result};
 use outcrop_disk::spill::Sorter;
 use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_geom::region::Region;
-use outcrop_points::{Crs, Spool, is_remote};
+use outcrop_points::{Crs, Ingest, Spool, is_remote};
 use samples::{Choice, Samples, Scale};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -164,7 +164,7 @@ enum Sampled {
 }
 
 impl Sampled {
-    fn open(path: &Path, options: &Options, workspace: &Workspace) -> Result<Self> {
+    fn open(path: &Path, options: &Options, ingest: Ingest, workspace: &Workspace) -> Result<Self> {
         let columns = options.columns();
         if path.is_file() && holds_faces(path)? {
             let surface = pieces::Surface::wanting(path, columns.names(), workspace)?;
@@ -172,7 +172,7 @@ impl Sampled {
         }
         // A cell at the edge of the region has points beyond it.
         let region = options.crop.as_ref().map(|region| (region, options.cell));
-        let cloud = Cloud::read(path, columns, region, workspace)?;
+        let cloud = Cloud::read(path, columns, region, ingest, workspace)?;
         Ok(Self::Cloud(Box::new(cloud)))
     }
 
@@ -205,17 +205,23 @@ impl Sampled {
     }
 }
 
-/// Makes a height raster of a mesh or a cloud, in any format that is read.
+/// Makes a height raster of a mesh, or of a cloud, which `ingest` reads.
 ///
 /// # Errors
 /// [`Error::Input`] for a file that cannot be read, or has no such columns; [`Error::Parameter`] for options that make
 /// no sense; [`Error::Memory`] if the budget is too small; [`Error::Io`], [`Error::Disk`], [`Error::Corrupt`],
 /// [`Error::Cancelled`].
-pub fn raster(source: &Path, options: &Options, workspace: &Workspace) -> Result<Raster> {
+pub fn raster(
+    source: &Path,
+    options: &Options,
+    ingest: Ingest,
+    workspace: &Workspace,
+) -> Result<Raster> {
     options.check(source)?;
     // When all is done, the files of the steps inside may be gone.
     workspace.once("raster", |_| {
-        let mut made = workspace.once("cells", |unit| sampled(source, options, unit, workspace))?;
+        let sampled = |unit: &Unit<'_>| sampled(source, options, ingest, unit, workspace);
+        let mut made = workspace.once("cells", sampled)?;
         // Not before: an attempt that was killed needs it again.
         let spool = made.spool.take();
         spool.map_or(Ok(()), |spool| spool.release(workspace))?;
@@ -229,10 +235,11 @@ pub fn raster(source: &Path, options: &Options, workspace: &Workspace) -> Result
 fn sampled(
     source: &Path,
     options: &Options,
+    ingest: Ingest,
     unit: &Unit<'_>,
     workspace: &Workspace,
 ) -> Result<Made> {
-    let sampled = Sampled::open(source, options, workspace)?;
+    let sampled = Sampled::open(source, options, ingest, workspace)?;
     let system = sampled.system(source, workspace)?;
     let keys = Keys::of(system.as_ref());
     if let (false, Some(system)) = (keys.is_known, &system) {

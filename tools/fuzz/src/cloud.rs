@@ -2,7 +2,8 @@
 
 use crate::{Bench, check_error};
 use outcrop::Error;
-use outcrop_points::{Spool, ingest, probe};
+use outcrop_formats::{ingest, probe};
+use outcrop_points::Spool;
 
 /// Reads a file of this extension, and streams its points on their lattice.
 pub fn read(extension: &str, bytes: &[u8]) {

@@ -4,7 +4,7 @@
 mod recipe;
 
 use crate::{Bench, check_error};
-use outcrop_points::ingest;
+use outcrop_formats::ingest;
 
 /// Writes the text that the bytes stand for: it is read as the plain reading says, or both refuse it.
 pub fn read(bytes: &[u8]) {

@@ -3,7 +3,7 @@
 use crate::folder::{BETWEEN, split};
 use crate::{Bench, check_error, cloud};
 use outcrop::{Error, Params};
-use outcrop_points::{ingest_selected, probe};
+use outcrop_formats::{ingest_selected, probe};
 
 /// The extensions of the file of a node.
 pub const DATA: [&str; 3] = ["laz", "bin", "zst"];

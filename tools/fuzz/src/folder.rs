@@ -3,7 +3,7 @@
 use crate::{Bench, check_error, cloud};
 use outcrop::inspect::info::info;
 use outcrop::{Classes, Error, Params, Region};
-use outcrop_points::{expand, ingest_selected, probe};
+use outcrop_formats::{expand, ingest_selected, probe};
 
 /// Separator between two files.
 pub const BETWEEN: &[u8] = b"\n=====\n";

@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use outcrop_disk::workspace::Workspace;
-use outcrop_points::ingest;
+use outcrop_formats::ingest;
 use std::path::Path;
 
 /// All distinct points with finite coordinates, sorted by coordinates.

@@ -61,7 +61,7 @@ impl Sample {
 /// The distinct points of a cloud along the Hilbert curve, by the pipeline's own ingest and order; and the
 /// length of a lattice step.
 pub fn ordered(cloud: &Path, workspace: &Workspace) -> Result<(PointStore, f64)> {
-    let spool = outcrop_points::ingest(&[cloud.to_owned()], workspace)?;
+    let spool = outcrop_formats::ingest(&[cloud.to_owned()], workspace)?;
     let lattice = spool.choose_lattice(0)?;
     let orderer = order::Orderer::new(workspace)?;
     spool.for_each(workspace, &lattice, |points| {
