@@ -8,6 +8,8 @@ use super::formats::readable;
 use super::remote::is_remote;
 use outcrop_disk::error::{Error, Result};
 use outcrop_points::LeftOut;
+use std::collections::{BTreeSet, VecDeque};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// Most names in a message about files that are left out.
@@ -25,7 +27,8 @@ pub(super) struct Expanded {
 /// The point files of `inputs`: files are taken as they are, folders and prefixes of stores recursively, sorted by
 /// name. A text whose first line is a URL is a list of inputs.
 ///
-/// In folders, hidden files and files that are not scans are skipped; links to folders are not followed.
+/// In folders, hidden files and files that are not scans are skipped. Links are followed; a folder to which several ways
+/// lead is read once.
 ///
 /// # Errors
 /// [`Error::Io`] if something cannot be read, [`Error::Input`] for a folder without point files.
@@ -54,7 +57,7 @@ pub(super) fn expanded(inputs: &[PathBuf]) -> Result<Expanded> {
                 all.files.push(input.clone());
                 continue;
             }
-            found.walk(input)?;
+            found.search(input)?;
             found.sort_out();
         }
         if found.scans.is_empty() {
@@ -107,14 +110,31 @@ struct Found {
     scans: Vec<(PathBuf, u64)>,
     short: Vec<Short>,
     left_out: Vec<LeftOut>,
+    /// Folders that were searched, without links in their paths.
+    searched: BTreeSet<PathBuf>,
+    /// Links to folders that were met and not yet followed.
+    links: VecDeque<PathBuf>,
 }
 
 impl Found {
+    /// Searches a folder, and then those to which links in it lead: so a folder inside it has its own name.
+    fn search(&mut self, folder: &Path) -> Result<()> {
+        self.walk(folder)?;
+        while let Some(link) = self.links.pop_front() {
+            self.walk(&link)?;
+        }
+        Ok(())
+    }
+
     fn leave_out(&mut self, path: PathBuf, why: String) {
         self.left_out.push(LeftOut { path, why });
     }
 
     fn walk(&mut self, folder: &Path) -> Result<()> {
+        let place = std::fs::canonicalize(folder).map_err(|e| Error::io(folder, "find", e))?;
+        if !self.searched.insert(place) {
+            return Ok(());
+        }
         let tiles = folder.join(ept::NAME);
         if tiles.is_file() {
             // It stands for the files below.
@@ -131,23 +151,40 @@ impl Found {
                 continue;
             }
             let path = entry.path();
-            if entry.file_type().map_err(failed)?.is_dir() {
-                match is_tileset(&path) {
-                    true => self.leave_out(path, "levels of detail".into()),
-                    false if is_scratch(&path) => {}
-                    false => self.walk(&path)?,
+            let is_link = entry.file_type().map_err(failed)?.is_symlink();
+            match std::fs::metadata(&path) {
+                Ok(about) if about.is_dir() => self.folder(path, is_link)?,
+                Ok(about) if about.is_file() => self.file(path, about.len())?,
+                // A pipe or a device.
+                Ok(_) => {}
+                Err(e) if is_link && e.kind() == ErrorKind::NotFound => {
+                    self.leave_out(path, "a link to nothing".into());
                 }
-                continue;
+                Err(e) => self.leave_out(path, format!("it cannot be opened: {e}")),
             }
-            let Some(bytes) = std::fs::metadata(&path).ok().filter(|m| m.is_file()) else {
-                continue;
-            };
-            match judge(&path)? {
-                Judged::Scan => self.scans.push((path, bytes.len())),
-                Judged::Short(lines) => self.short.push((path, lines, bytes.len())),
-                Judged::LeftOut(why) => self.leave_out(path, why),
-                Judged::Other => {}
-            }
+        }
+        Ok(())
+    }
+
+    fn folder(&mut self, path: PathBuf, is_link: bool) -> Result<()> {
+        if is_tileset(&path) {
+            self.leave_out(path, "levels of detail".into());
+            return Ok(());
+        }
+        match (is_scratch(&path), is_link) {
+            (true, _) => {}
+            (false, true) => self.links.push_back(path),
+            (false, false) => self.walk(&path)?,
+        }
+        Ok(())
+    }
+
+    fn file(&mut self, path: PathBuf, bytes: u64) -> Result<()> {
+        match judge(&path)? {
+            Judged::Scan => self.scans.push((path, bytes)),
+            Judged::Short(lines) => self.short.push((path, lines, bytes)),
+            Judged::LeftOut(why) => self.leave_out(path, why),
+            Judged::Other => {}
         }
         Ok(())
     }

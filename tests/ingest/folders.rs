@@ -215,3 +215,46 @@ fn a_folder_of_meshes_alone_is_refused_with_their_names() {
     assert!(error.contains("no point file, but "), "{error}");
     assert!(error.contains("mesh.ply (a mesh with faces)"), "{error}");
 }
+
+#[cfg(unix)]
+#[test]
+fn links_are_followed_once_and_those_to_nothing_are_told() {
+    use std::os::unix::fs::symlink;
+    let bench = Bench::new();
+    let folder = folder(&bench);
+    let tile = std::fs::read(folder.join("tile.las")).unwrap();
+    // A folder elsewhere, which leads back; and one inside, with a link that comes first by name.
+    std::fs::create_dir(bench.path("elsewhere")).unwrap();
+    std::fs::create_dir(folder.join("inside")).unwrap();
+    std::fs::write(bench.path("elsewhere/far.las"), &tile).unwrap();
+    std::fs::write(folder.join("inside/near.las"), &tile).unwrap();
+    for (to, link) in [
+        ("../in", "elsewhere/back"),
+        ("../elsewhere", "in/linked"),
+        ("../elsewhere", "in/twice"),
+        ("inside", "in/again"),
+        (".", "in/self"),
+        ("..", "in/inside/up"),
+        ("gone.las", "in/missing.las"),
+        ("../gone", "in/missing"),
+        ("round", "in/round"),
+        ("gone", "in/.hidden"),
+    ] {
+        symlink(to, bench.path(link)).unwrap();
+    }
+    let wanted = ["inside/near.las", "linked/far.las", "tile.las"].map(|name| folder.join(name));
+    assert_eq!(expand(std::slice::from_ref(&folder)).unwrap(), wanted);
+    let spool = bench.read(&[folder]).unwrap();
+    let (read, left_out) = told(&spool);
+    assert_eq!(read, ["near.las", "far.las", "tile.las"]);
+    let names: Vec<&str> = left_out.iter().map(|(name, _)| &name[..]).collect();
+    assert_eq!(names, ["missing", "missing.las", "round"]);
+    assert_eq!(left_out[0].1, "a link to nothing");
+    assert_eq!(left_out[1].1, "a link to nothing");
+    assert!(left_out[2].1.starts_with("it cannot be opened: "));
+    let warnings = &spool.stats().warnings;
+    assert!(
+        warnings[0].starts_with("left out 3 files in folders, as no scans: "),
+        "{warnings:?}"
+    );
+}
