@@ -13,7 +13,7 @@ pub use ablation::{METHOD, report};
 use constants::constants;
 
 /// The version of the method, as a literal: it grows whenever the mesh of any cloud changes, by a constant, a
-/// rule or a correction. docs/versions.md lists all versions, and `tests/end_to_end/versions.rs` holds it.
+/// rule or a correction. docs/versions.md lists all versions, and `tests/program/end_to_end/versions.rs` holds it.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! __method_version {

@@ -1,7 +1,7 @@
 //! What each system does in its own way: files at offsets, private files and folders, syncing, links, room on
 //! disks, memory, signals, the program's own file. Nothing here knows what the files are for.
 //!
-//! No other room asks on which system it runs (`tests/architecture.rs`). Here every item is described once, in
+//! No other room asks on which system it runs (`tests/house/architecture.rs`). Here every item is described once, in
 //! [`files`], [`names`] and [`process`], and made once for each system, in a file of its own: whoever adds an item
 //! adds it to all of them, since a system that lacks one does not compile.
 //!

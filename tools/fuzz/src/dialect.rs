@@ -1,6 +1,6 @@
 //! Text with a point a line, as a table of known columns was written.
 
-#[path = "../../../tests/ingest/recipe.rs"]
+#[path = "../../../tests/program/ingest/recipe.rs"]
 mod recipe;
 
 use crate::{Bench, check_error};

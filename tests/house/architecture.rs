@@ -1,0 +1,416 @@
+//! The map of ARCHITECTURE.md, checked by the paths in `src`: the permitted imports of each room inside a crate (the
+//! manifests hold those between crates), no circle of imports, rows with named fields, and files of limited length.
+
+use crate::source::{modules, modules_of};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+/// Each room, and the rooms of the same crate whose items it may use. A room is a folder or file of a crate with
+/// several steps, or of the program.
+const MAY_USE: &[(&str, &str)] = &[
+    (
+        "cli",
+        "deliver faults features info page params pipeline report",
+    ),
+    ("convert", "write"),
+    ("deliver", "features"),
+    ("faults", ""),
+    ("features", ""),
+    ("info", "params pipeline"),
+    ("page", "info report"),
+    ("params", ""),
+    ("pipeline", "deliver features params report write"),
+    ("report", "deliver params"),
+    ("write", ""),
+    ("disk/error", ""),
+    ("disk/spill", "disk/error disk/workspace"),
+    ("disk/workspace", "disk/error"),
+    ("draw/cloud", "draw/histogram draw/picture"),
+    ("draw/histogram", ""),
+    ("draw/mesh", "draw/histogram draw/picture"),
+    ("draw/picture", ""),
+    ("geom", "geom/kernels geom/method"),
+    ("geom/kernels", ""),
+    ("geom/method", ""),
+    ("mesh/confidence", "mesh/repair mesh/surface mesh/triples"),
+    ("mesh/repair", "mesh/stitch mesh/surface"),
+    ("mesh/stitch", "mesh/surface mesh/triples"),
+    ("mesh/surface", ""),
+    ("mesh/triples", ""),
+    ("mesh_files/cut", ""),
+    ("mesh_files/export", "mesh_files/cut"),
+    ("stages/attributes", "stages/blocks stages/ids stages/order"),
+    ("stages/blocks", "stages/ids"),
+    (
+        "stages/cells",
+        "stages/blocks stages/ids stages/levels stages/normals stages/order stages/spacing stages/tiles",
+    ),
+    ("stages/columns", "stages/blocks stages/ids stages/order"),
+    ("stages/ids", ""),
+    ("stages/levels", ""),
+    (
+        "stages/located",
+        "stages/blocks stages/cells stages/ids stages/levels stages/order stages/outside stages/spacing",
+    ),
+    (
+        "stages/normals",
+        "stages/attributes stages/blocks stages/ids stages/order",
+    ),
+    ("stages/order", "stages/ids"),
+    (
+        "stages/outliers",
+        "stages/blocks stages/cells stages/ids stages/order stages/tiles",
+    ),
+    (
+        "stages/outside",
+        "stages/blocks stages/columns stages/ids stages/normals stages/order stages/scanners",
+    ),
+    ("stages/scanners", "stages/attributes stages/ids"),
+    (
+        "stages/smooth",
+        "stages/cells stages/ids stages/levels stages/order stages/spacing stages/tiles",
+    ),
+    ("stages/spacing", "stages/ids stages/levels"),
+    ("stages/thin", ""),
+    ("stages/tiles", "stages/ids stages/order"),
+];
+
+/// Largest number of lines of a file, without its tests.
+const MOST_LINES: usize = 500;
+
+/// `a::{b, c::{d, e}}` as `a::b`, `a::c::d`, `a::c::e`.
+fn expand(path: &str) -> Vec<String> {
+    let Some((before, inside)) = path.split_once('{') else {
+        return vec![path.split(" as ").next().unwrap().trim().to_owned()];
+    };
+    let inside = inside.trim_end().strip_suffix('}').unwrap();
+    let (mut parts, mut depth) = (vec![String::new()], 0);
+    for c in inside.chars() {
+        depth += i32::from(c == '{') - i32::from(c == '}');
+        if c == ',' && depth == 0 {
+            parts.push(String::new());
+        } else {
+            parts.last_mut().unwrap().push(c);
+        }
+    }
+    let parts = parts.iter().map(|part| part.trim());
+    let parts = parts.filter(|part| !part.is_empty());
+    parts
+        .flat_map(|part| expand(&format!("{}{part}", before.trim_start())))
+        .collect()
+}
+
+/// The folder of the crate to which a module belongs; `None` for the program.
+fn crate_of(module: &str) -> Option<&str> {
+    let first = module.split('/').next()?;
+    let manifest = format!("{}/src/{first}/Cargo.toml", env!("CARGO_MANIFEST_DIR"));
+    Path::new(&manifest).exists().then_some(first)
+}
+
+/// The paths in a text that begin with `crate`, `super`, `self` or a crate of the program, those of `use` with
+/// braces included.
+fn paths(text: &str) -> Vec<&str> {
+    let word = |c: char| c.is_alphanumeric() || c == '_';
+    let mut found = Vec::new();
+    let mut from = 0;
+    while let Some(length) = text[from..].find(word) {
+        let start = from + length;
+        let rest = &text[start..];
+        let first = rest.find(|c| !word(c)).unwrap_or(rest.len());
+        let root = ["crate", "super", "self"].contains(&&rest[..first])
+            || rest[..first].starts_with("outcrop_");
+        let mut length = rest.find(|c| !word(c) && c != ':').unwrap_or(rest.len());
+        if root && rest[..length].ends_with("::") && rest[length..].starts_with('{') {
+            let mut depth = 0;
+            let closing = rest[length..].find(|c| {
+                depth += i32::from(c == '{') - i32::from(c == '}');
+                depth == 0
+            });
+            length += closing.expect("a closing brace") + 1;
+        }
+        if root && rest[first..length].starts_with("::") {
+            found.push(&rest[..length]);
+        }
+        from = start + length;
+    }
+    found
+}
+
+/// The modules that a module imports from, by the paths in its text.
+fn imports(module: &str, text: &str, all: &BTreeMap<String, String>) -> BTreeSet<String> {
+    let mut found = BTreeSet::new();
+    for path in paths(text) {
+        let path = path.split_whitespace().collect::<Vec<_>>().join(" ");
+        for path in expand(&path) {
+            let mut at: Vec<&str> = module.split('/').collect();
+            for (number, part) in path.split("::").enumerate() {
+                match part.trim() {
+                    "crate" if number == 0 => at = crate_of(module).into_iter().collect(),
+                    part if number == 0 && part.starts_with("outcrop_") => {
+                        at = vec![&part["outcrop_".len()..]];
+                    }
+                    "self" => {}
+                    "super" => drop(at.pop()),
+                    part => {
+                        at.push(part);
+                        if !all.contains_key(&at.join("/")) {
+                            at.pop();
+                            break;
+                        }
+                    }
+                }
+            }
+            let target = at.join("/");
+            if target != module && all.contains_key(&target) {
+                found.insert(target);
+            }
+        }
+    }
+    found
+}
+
+/// The room of a module: the crate, or, in a crate with several rooms, its folder or file there.
+fn room(module: &str) -> String {
+    let inside = MAY_USE.iter().map(|(room, _)| *room);
+    let holds = |room: &&str| module == *room || module.starts_with(&format!("{room}/"));
+    let room = inside.filter(holds).max_by_key(|room| room.len());
+    let first = module.split('/').next().unwrap_or_default();
+    room.unwrap_or(first).to_owned()
+}
+
+fn graph() -> BTreeMap<String, BTreeSet<String>> {
+    let all = modules();
+    let edges = all
+        .iter()
+        .map(|(module, text)| (module.clone(), imports(module, text, &all)));
+    edges.collect()
+}
+
+#[test]
+fn paths_are_read() {
+    let expanded = expand("crate::a::{b, c::{D, self}, e::F as G}");
+    assert_eq!(
+        expanded,
+        [
+            "crate::a::b",
+            "crate::a::c::D",
+            "crate::a::c::self",
+            "crate::a::e::F"
+        ]
+    );
+    let graph = graph();
+    assert!(graph["pipeline/stages"].contains("mesh/repair"));
+    assert!(graph["disk/spill/table"].contains("disk/workspace/place"));
+    // A path without a `use` line.
+    let text = "fn f() -> super::b::C { outcrop_d::e(crate::g::h) }";
+    assert_eq!(paths(text), ["super::b::C", "outcrop_d::e", "crate::g::h"]);
+}
+
+#[test]
+fn no_room_knows_more_than_the_map_says() {
+    let rules: BTreeMap<&str, &str> = MAY_USE.iter().copied().collect();
+    let mut wrong = Vec::new();
+    for (module, targets) in graph() {
+        let from = room(&module);
+        let Some(allowed) = rules.get(from.as_str()) else {
+            let alone = crate_of(&module) == Some(from.as_str());
+            assert!(alone, "{from} is not on the map");
+            continue;
+        };
+        let allowed: BTreeSet<&str> = allowed.split(' ').collect();
+        for target in targets {
+            let to = room(&target);
+            let same = crate_of(&target) == crate_of(&module);
+            if same && to != from && !allowed.contains(to.as_str()) {
+                wrong.push(format!("{module} uses {target}"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "not on the map:\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn no_circle_of_imports() {
+    let mut graph = graph();
+    // Modules whose imports are all removed already are in no circle.
+    loop {
+        let free: Vec<String> = graph
+            .iter()
+            .filter(|(_, targets)| targets.iter().all(|t| !graph.contains_key(t)))
+            .map(|(module, _)| module.clone())
+            .collect();
+        if free.is_empty() {
+            break;
+        }
+        free.iter().for_each(|module| drop(graph.remove(module)));
+    }
+    // A folder's first file and its other files count as one module.
+    let mut circles = BTreeMap::new();
+    for (module, targets) in &graph {
+        let inside = |t: &&String| graph.contains_key(*t) && !module.starts_with(&format!("{t}/"));
+        let inside: Vec<&String> = targets.iter().filter(inside).collect();
+        if !inside.is_empty() {
+            circles.insert(module, inside);
+        }
+    }
+    let reaches = |from: &String, to: &String| {
+        let (mut seen, mut stack) = (BTreeSet::new(), vec![from]);
+        while let Some(at) = stack.pop() {
+            for &next in circles.get(at).into_iter().flatten() {
+                if next == to {
+                    return true;
+                }
+                if seen.insert(next) {
+                    stack.push(next);
+                }
+            }
+        }
+        false
+    };
+    let wrong: Vec<_> = circles
+        .keys()
+        .filter(|module| reaches(module, module))
+        .collect();
+    assert!(wrong.is_empty(), "in circles of imports: {wrong:?}");
+}
+
+#[test]
+fn no_stage_reads_records_by_position() {
+    for (module, text) in modules() {
+        if module.starts_with("stages/") {
+            let plain = ["Table<[u32", "Shuffle<[u32", "Sorter<[u32"];
+            let found = plain.iter().find(|plain| text.contains(**plain));
+            assert!(found.is_none(), "{module}: {found:?} has no named fields");
+        }
+    }
+}
+
+#[test]
+fn no_state_is_hidden_in_threads() {
+    let found = modules().into_iter().filter(|(module, text)| {
+        // The hook of panics has no other way to know who asks.
+        module != "formats/contain" && text.contains("thread_local!")
+    });
+    assert_eq!(found.map(|(module, _)| module).collect::<Vec<_>>(), [""; 0]);
+}
+
+#[test]
+fn only_kernels_are_tied_to_a_processor() {
+    let tied = [
+        "target_arch",
+        "std::arch",
+        "core::arch",
+        "is_x86_feature_detected",
+        "asm!",
+    ];
+    let found = modules().into_iter().filter(|(module, text)| {
+        !module.starts_with("geom/kernels") && tied.iter().any(|word| text.contains(word))
+    });
+    assert_eq!(found.map(|(module, _)| module).collect::<Vec<_>>(), [""; 0]);
+    // Of the kernels every use is for x86-64 only: what else there is, is for every processor.
+    let kernels = modules()
+        .into_iter()
+        .filter(|(m, _)| m.starts_with("geom/kernels"));
+    let mut uses = 0;
+    for (module, text) in kernels {
+        uses += text.matches("target_arch = \"x86_64\"").count();
+        let others = text.matches("target_arch").count() - text.matches("x86_64\")").count();
+        assert_eq!(others, 0, "{module}");
+    }
+    assert!(uses > 5, "{uses}");
+}
+
+#[test]
+fn only_the_platform_knows_the_system() {
+    let tied = [
+        "cfg(unix",
+        "cfg(windows",
+        "cfg!(unix",
+        "cfg!(windows",
+        "target_os",
+        "target_env",
+        "target_family",
+        "std::os::",
+        "rustix::",
+        "libc::",
+        "signal_hook",
+        "windows_sys",
+        "/proc/",
+        "/sys/",
+    ];
+    let found = modules().into_iter().chain(modules_of("tools/ply/src"));
+    let found = found.filter(|(module, text)| {
+        !module.starts_with("platform") && tied.iter().any(|word| text.contains(word))
+    });
+    assert_eq!(found.map(|(module, _)| module).collect::<Vec<_>>(), [""; 0]);
+}
+
+/// The compiler sees the files of one system only.
+#[test]
+fn every_system_has_every_item_of_the_platform() {
+    let word = |c: char| c.is_alphanumeric() || c == '_';
+    let all = modules_of("src/platform");
+    let faces = ["files", "names", "process"].map(|face| &all[face]);
+    let items = faces.into_iter().flat_map(|text| {
+        let after = text
+            .match_indices("system::")
+            .map(|(at, _)| &text[at + 8..]);
+        after.map(|rest| &rest[..rest.find(|c| !word(c)).unwrap_or(rest.len())])
+    });
+    let items: BTreeSet<&str> = items.collect();
+    assert!(items.len() > 30, "{items:?}");
+    for system in ["linux", "macos", "windows"] {
+        let here = all.iter().filter(|(name, _)| name.starts_with(system));
+        let words = here.flat_map(|(_, text)| text.split(|c| !word(c)));
+        let words: BTreeSet<&str> = words.collect();
+        let missing: Vec<_> = items.difference(&words).collect();
+        assert!(missing.is_empty(), "{system} lacks {missing:?}");
+    }
+}
+
+/// Functions of floats that a system has in its own library, with its own rounding. `sqrt`, `floor`, `ceil`, `round`,
+/// `%` and whole powers are exact or the same everywhere.
+const ROUNDED_BY_THE_SYSTEM: [&str; 27] = [
+    "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "cbrt", "cos", "cosh", "exp",
+    "exp2", "exp_m1", "hypot", "ln", "ln_1p", "ln_gamma", "log", "log10", "log2", "mul_add",
+    "powf", "sin", "sin_cos", "sinh", "tan", "tanh",
+];
+
+#[test]
+fn no_result_depends_on_the_library_of_the_system() {
+    let tools = ["cloudgen", "ply", "raster"];
+    let tools = tools.map(|tool| (tool, modules_of(&format!("tools/{tool}/src"))));
+    let tools = tools.into_iter().flat_map(|(tool, modules)| {
+        let named = move |(module, text)| (format!("{tool}/{module}"), text);
+        modules.into_iter().map(named)
+    });
+    let mut wrong = Vec::new();
+    for (module, text) in modules().into_iter().chain(tools) {
+        for name in ROUNDED_BY_THE_SYSTEM {
+            let calls = [
+                format!(".{name}("),
+                format!("f64::{name}"),
+                format!("f32::{name}"),
+            ];
+            let word = |rest: &str| !rest.starts_with(|c: char| c.is_alphanumeric() || c == '_');
+            let found = calls.iter().any(|call| {
+                let mut after = text.match_indices(call.as_str());
+                after.any(|(at, _)| call.ends_with('(') || word(&text[at + call.len()..]))
+            });
+            if found {
+                wrong.push(format!("{module}: {name}"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "use the crate libm: {wrong:?}");
+}
+
+#[test]
+fn files_are_about_one_thing() {
+    let long: Vec<_> = modules()
+        .into_iter()
+        .map(|(module, text)| (text.lines().count(), module))
+        .filter(|(lines, _)| *lines > MOST_LINES)
+        .collect();
+    assert!(long.is_empty(), "more than {MOST_LINES} lines: {long:?}");
+}
