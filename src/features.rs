@@ -32,7 +32,7 @@ const ABLATION: Feature = feature!("ablation", "other constants of the method");
 const FAULTS: Feature = feature!("faults", "fault injection");
 
 /// Those that are off by default come last.
-const ALL: [Feature; 8] = [CLOUD, DEMO, E57, LEVELS, PAGES, VIEW, ABLATION, FAULTS];
+const ALL: [Feature; 8] = [DEMO, E57, LEVELS, PAGES, VIEW, CLOUD, ABLATION, FAULTS];
 
 impl Feature {
     /// An error if the part was left out.

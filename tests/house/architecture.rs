@@ -405,6 +405,49 @@ fn no_result_depends_on_the_library_of_the_system() {
     assert!(wrong.is_empty(), "use the crate libm: {wrong:?}");
 }
 
+/// The crates that the program is built of, each with its version and features, with these arguments of cargo.
+fn built(arguments: &[&str]) -> BTreeSet<String> {
+    let mut cargo = std::process::Command::new(env!("CARGO"));
+    let what = ["tree", "--offline", "--locked", "--edges", "normal,build"];
+    let how = ["--no-dedupe", "--prefix", "none", "--format", "{p} {f}"];
+    let cargo = cargo.args(what).args(how).args(arguments);
+    let output = cargo.current_dir(env!("CARGO_MANIFEST_DIR")).output();
+    let output = output.expect("cargo runs");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    let text = String::from_utf8(output.stdout).expect("text");
+    text.lines().map(str::to_owned).collect()
+}
+
+/// Crates with other features are built again, with all on top of them.
+#[test]
+fn the_feature_cloud_builds_only_the_readers_and_the_program_again() {
+    let (without, with) = (built(&[]), built(&["--features", "cloud"]));
+    assert!(with.iter().any(|line| line.starts_with("outcrop-remote ")));
+    let name = |line: &String| line.split(' ').next().unwrap_or_default().to_owned();
+    let again: BTreeSet<String> = without.difference(&with).map(name).collect();
+    let expected = ["outcrop", "outcrop-formats"].map(str::to_owned);
+    assert_eq!(
+        again,
+        expected.into(),
+        "the root manifest has their features"
+    );
+}
+
+/// Stages, meshes and what is measured know neither formats nor servers.
+#[test]
+fn only_the_program_reads_clouds() {
+    for package in ["draw", "inspect", "levels", "mesh-files", "survey"] {
+        let name = format!("outcrop-{package}");
+        let crates = built(&["--package", &name]);
+        let readers = ["outcrop-formats ", "outcrop-remote "];
+        let found = crates
+            .iter()
+            .find(|line| readers.iter().any(|reader| line.starts_with(reader)));
+        assert_eq!(found, None, "{name}");
+    }
+}
+
 #[test]
 fn files_are_about_one_thing() {
     let long: Vec<_> = modules()

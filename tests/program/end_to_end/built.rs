@@ -28,7 +28,7 @@ fn the_version_is_that_of_program_method_commit_and_features() {
     let (found, rest) = rest.split_once(", ").expect(&said.out);
     assert_eq!(
         rest,
-        "features cloud, demo, e57, levels, pages, view, faults)\n"
+        "features demo, e57, levels, pages, view, cloud, faults)\n"
     );
     if let Some(commit) = commit() {
         assert!(found == commit, "{found} is not {commit}");
