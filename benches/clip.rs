@@ -5,10 +5,10 @@ mod util;
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use outcrop_geom::clip::Cell;
-use outcrop_geom::clip::wrap::{MOST_NEIGHBORS, Site, TOGETHER, Wrapper};
-use outcrop_geom::kernels::Level;
-use outcrop_geom::plane::Normal;
+use outcrop_paper::clip::Cell;
+use outcrop_paper::clip::wrap::{MOST_NEIGHBORS, Site, TOGETHER, Wrapper};
+use outcrop_paper::kernels::Level;
+use outcrop_paper::plane::Normal;
 use outcrop_stages::ids::Id;
 use outcrop_stages::tiles::neighbors::Neighbors;
 

@@ -4,7 +4,7 @@ mod util;
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use outcrop_geom::kernels::{CornerGroup, LANES, Level, bisectors, cut_corners};
+use outcrop_paper::kernels::{CornerGroup, LANES, Level, bisectors, cut_corners};
 
 fn main() {
     divan::main();

@@ -4,7 +4,7 @@ mod util;
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use outcrop_geom::kernels::{Level, distances};
+use outcrop_paper::kernels::{Level, distances};
 
 fn main() {
     divan::main();

@@ -4,8 +4,8 @@ mod util;
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use outcrop_geom::kernels::Level;
-use outcrop_geom::plane::{Moments, PLANES, planes};
+use outcrop_paper::kernels::Level;
+use outcrop_paper::plane::{Moments, PLANES, planes};
 use outcrop_stages::ids::Id;
 use outcrop_stages::tiles::neighbors::Neighbors;
 

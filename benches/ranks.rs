@@ -4,7 +4,7 @@ mod util;
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use outcrop_geom::kernels::{Level, ranks};
+use outcrop_paper::kernels::{Level, ranks};
 
 fn main() {
     divan::main();

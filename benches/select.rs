@@ -4,7 +4,7 @@ mod util;
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use outcrop_geom::kernels::{Level, count_within, pick_column};
+use outcrop_paper::kernels::{Level, count_within, pick_column};
 
 fn main() {
     divan::main();

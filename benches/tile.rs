@@ -4,7 +4,7 @@ mod util;
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use outcrop_geom::kernels::Level;
+use outcrop_paper::kernels::Level;
 use outcrop_stages::tiles::Tile;
 use outcrop_stages::tiles::near::Search;
 

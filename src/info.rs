@@ -17,7 +17,7 @@ use outcrop_draw::histogram::Tally;
 use outcrop_formats::ingest_selected;
 use outcrop_geom::aabb::Aabb;
 use outcrop_geom::lattice::Lattice;
-use outcrop_geom::method::METHOD;
+use outcrop_paper::method::METHOD;
 use outcrop_points::{Attributes, CoordinateType, IngestStats, Selection, Spool};
 use outcrop_stages::attributes::attributes;
 use outcrop_stages::blocks::Blocks;

@@ -12,9 +12,9 @@ pub use lengths::{MaxWidth, Radius};
 pub use origin::Origin;
 use outcrop_disk::error::{Error, Result, Setting};
 use outcrop_disk::workspace::progress::Observer;
-use outcrop_geom::method::METHOD;
 pub use outcrop_geom::region::{NoRegion, Region};
 pub use outcrop_mesh::surface::evidence::Division;
+use outcrop_paper::method::METHOD;
 use outcrop_points::{
     Attributes, Classes, Crop, GivenCrs, IngestStats, Layout, Selection, TextColumns,
 };

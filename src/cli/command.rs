@@ -8,7 +8,7 @@ use super::shared::{Advance, Plan, Status, Submit, Work};
 use crate::features;
 use clap::{Parser, Subcommand};
 use clap_complete::Shell;
-use outcrop_geom::method::method_version;
+use outcrop_paper::method::method_version;
 use std::path::PathBuf;
 
 /// Turns point clouds of any size into clean triangle meshes within a memory budget.

@@ -39,7 +39,7 @@ const DAMAGED: u8 = 65;
 #[must_use]
 pub fn main() -> ExitCode {
     #[cfg(feature = "ablation")]
-    match outcrop_geom::method::report() {
+    match outcrop_paper::method::report() {
         Ok(list) if list.is_empty() => {}
         Ok(list) => {
             print!("{list}");

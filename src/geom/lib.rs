@@ -1,16 +1,10 @@
-//! Exact geometry on the integer lattice: points, boxes, curve keys, planes, predicates, cells; the vector
-//! kernels of the inner loops; and the constants of the method.
+//! Exact geometry on the integer lattice: points, boxes, curve keys, triangles; and regions of space.
 
 pub mod aabb;
 pub mod boxes;
-pub mod clip;
 pub mod distance;
 pub mod hilbert;
-pub mod kernels;
 pub mod lattice;
-pub mod method;
-pub mod plane;
-pub mod predicate;
 pub mod region;
 pub mod round;
 pub mod triangle;

@@ -12,7 +12,7 @@ use outcrop_disk::spill::Table;
 use outcrop_disk::workspace::Unit;
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_geom::Point;
-use outcrop_geom::method::METHOD;
+use outcrop_paper::method::METHOD;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// One of the two directions along an axis.

@@ -8,9 +8,9 @@ use crate::order::PointStore;
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_disk::workspace::{Unit, Workspace};
-use outcrop_geom::method::METHOD;
-use outcrop_geom::plane::Normal;
 use outcrop_geom::{Point, sub};
+use outcrop_paper::method::METHOD;
+use outcrop_paper::plane::Normal;
 use outcrop_points::direction;
 use serde::{Deserialize, Serialize};
 

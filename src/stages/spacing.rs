@@ -7,9 +7,9 @@ use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::memory::Reservation;
 use outcrop_geom::Point;
 use outcrop_geom::distance2;
-use outcrop_geom::method::METHOD;
-use outcrop_geom::plane::Moments;
 use outcrop_geom::triangle::area;
+use outcrop_paper::method::METHOD;
+use outcrop_paper::plane::Moments;
 use serde::{Deserialize, Serialize};
 
 /// A limit of length.

@@ -29,9 +29,6 @@ const MAY_USE: &[(&str, &str)] = &[
     ("draw/histogram", ""),
     ("draw/mesh", "draw/histogram draw/picture"),
     ("draw/picture", ""),
-    ("geom", "geom/kernels geom/method"),
-    ("geom/kernels", ""),
-    ("geom/method", ""),
     ("mesh/confidence", "mesh/repair mesh/surface mesh/triples"),
     ("mesh/repair", "mesh/stitch mesh/surface"),
     ("mesh/stitch", "mesh/surface mesh/triples"),
@@ -39,6 +36,9 @@ const MAY_USE: &[(&str, &str)] = &[
     ("mesh/triples", ""),
     ("mesh_files/cut", ""),
     ("mesh_files/export", "mesh_files/cut"),
+    ("paper", "paper/kernels paper/method"),
+    ("paper/kernels", ""),
+    ("paper/method", ""),
     ("stages/attributes", "stages/blocks stages/ids stages/order"),
     ("stages/blocks", "stages/ids"),
     (
@@ -304,13 +304,13 @@ fn only_kernels_are_tied_to_a_processor() {
         "asm!",
     ];
     let found = modules().into_iter().filter(|(module, text)| {
-        !module.starts_with("geom/kernels") && tied.iter().any(|word| text.contains(word))
+        !module.starts_with("paper/kernels") && tied.iter().any(|word| text.contains(word))
     });
     assert_eq!(found.map(|(module, _)| module).collect::<Vec<_>>(), [""; 0]);
     // Of the kernels every use is for x86-64 only: what else there is, is for every processor.
     let kernels = modules()
         .into_iter()
-        .filter(|(m, _)| m.starts_with("geom/kernels"));
+        .filter(|(m, _)| m.starts_with("paper/kernels"));
     let mut uses = 0;
     for (module, text) in kernels {
         uses += text.matches("target_arch = \"x86_64\"").count();

@@ -1,11 +1,11 @@
-//! The exact corner test of `geom::predicate` against power diagrams with real, tiny weights, and the clipped
-//! cells of `geom::clip` against all corners that no neighbour cuts off.
+//! The exact corner test of `paper::predicate` against power diagrams with real, tiny weights, and the clipped
+//! cells of `paper::clip` against all corners that no neighbour cuts off.
 
 use crate::reference::big::{Big, Big3, determinant, dot, vector};
 use crate::reference::clouds::{self, Random};
-use outcrop_geom::clip::Cell;
-use outcrop_geom::predicate::{Neighbor, cuts_corner, turn};
 use outcrop_geom::{Point, sub};
+use outcrop_paper::clip::Cell;
+use outcrop_paper::predicate::{Neighbor, cuts_corner, turn};
 
 /// The numbers below need 2100 bits.
 type Wide = Big<40>;

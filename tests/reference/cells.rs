@@ -4,10 +4,10 @@ use super::normals::{self, Short};
 use super::spacing::Density;
 use super::surface::Triangle;
 use super::{Radius, Settings};
-use outcrop_geom::clip::Cell;
 use outcrop_geom::lattice::COORDINATE_LIMIT;
-use outcrop_geom::plane::{Moments, Plane};
 use outcrop_geom::{Point, distance2, hilbert, sub};
+use outcrop_paper::clip::Cell;
+use outcrop_paper::plane::{Moments, Plane};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// All different points in the order of their ids.

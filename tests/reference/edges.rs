@@ -2,8 +2,8 @@
 
 use super::cells::by_distance;
 use outcrop_geom::lattice::COORDINATE_LIMIT;
-use outcrop_geom::plane::{Normal, least_direction};
 use outcrop_geom::{Point, distance2, sub};
+use outcrop_paper::plane::{Normal, least_direction};
 
 type Vec3 = [f64; 3];
 

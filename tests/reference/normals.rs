@@ -2,8 +2,8 @@
 
 use super::outside::{Known, Scanner};
 use super::{Given, Settings};
-use outcrop_geom::plane::{Moments, Plane};
 use outcrop_geom::{Point, sub};
+use outcrop_paper::plane::{Moments, Plane};
 
 /// The short form of a normal.
 pub type Short = [i32; 3];

@@ -4,8 +4,8 @@ use super::Settings;
 use super::cells::by_distance;
 use super::insert::normal;
 use super::surface::Triangle;
-use outcrop_geom::plane::Moments;
 use outcrop_geom::{Point, distance2};
+use outcrop_paper::plane::Moments;
 
 /// Ids in a patch, and patches in a region.
 const PATCH: usize = 256;

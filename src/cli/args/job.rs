@@ -7,7 +7,7 @@ use crate::params::{
 };
 use crate::pipeline::{Builder, Reconstruction};
 use clap::Args as ClapArgs;
-use outcrop_geom::method::METHOD;
+use outcrop_paper::method::METHOD;
 use outcrop_points::{Attributes, Classes, GivenCrs, TextColumns};
 use std::path::PathBuf;
 

@@ -8,8 +8,8 @@ use super::fill::{
 };
 use super::parts::Part;
 use outcrop_geom::distance2;
-use outcrop_geom::method::METHOD;
 use outcrop_geom::triangle::{area, length};
+use outcrop_paper::method::METHOD;
 use outcrop_stages::ids::{Id, Triangle};
 use outcrop_stages::spacing::Density;
 use rustc_hash::FxHashSet;

@@ -3,8 +3,8 @@
 
 use super::fill::{Corner, distance, edges, undirected};
 use outcrop_geom::Point;
-use outcrop_geom::method::METHOD;
 use outcrop_geom::triangle::{length, normal, on_a_line};
+use outcrop_paper::method::METHOD;
 use outcrop_stages::ids::{Id, Triangle};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

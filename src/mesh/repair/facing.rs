@@ -9,8 +9,8 @@ use crate::surface::parity::signed;
 use crate::surface::star::Triangle;
 use outcrop_disk::spill::row;
 use outcrop_geom::Point;
-use outcrop_geom::method::METHOD;
 use outcrop_geom::triangle::small_normal;
+use outcrop_paper::method::METHOD;
 use serde::{Deserialize, Serialize};
 
 /// Exact sums over the triangles of a component.

@@ -1,8 +1,8 @@
 //! Filling a hole by splitting its boundary loop (paper, section 3.6).
 
-use outcrop_geom::method::METHOD;
 use outcrop_geom::triangle::{add, length, normal, on_a_line};
 use outcrop_geom::{Point, distance2};
+use outcrop_paper::method::METHOD;
 use outcrop_stages::ids::{Id, Triangle};
 
 /// A vertex of a boundary loop.

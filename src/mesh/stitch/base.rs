@@ -12,7 +12,7 @@ use outcrop_disk::error::Result;
 use outcrop_disk::spill::{Inbox, Shuffle, Table, release};
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_disk::workspace::{Unit, Workspace};
-use outcrop_geom::kernels::{Level, MOST_EDGES, is_one_fan};
+use outcrop_paper::kernels::{Level, MOST_EDGES, is_one_fan};
 use outcrop_stages::blocks::Blocks;
 use outcrop_stages::cells::CountedTriple;
 use outcrop_stages::columns::{Direction, extreme};

@@ -8,7 +8,7 @@
 
 use super::parity::{ParitySets, signed};
 use outcrop_disk::workspace::memory::{bytes_of, table_bytes};
-use outcrop_geom::method::METHOD;
+use outcrop_paper::method::METHOD;
 use outcrop_stages::ids::Number;
 use rustc_hash::FxHashMap;
 use std::cmp::Reverse;

@@ -6,8 +6,8 @@
 use super::contract::upward;
 use super::star::Triangle;
 use outcrop_disk::workspace::memory::bytes_of;
-use outcrop_geom::method::METHOD;
 use outcrop_geom::triangle::small_normal;
+use outcrop_paper::method::METHOD;
 use outcrop_stages::ids::Id;
 use outcrop_stages::located::Located;
 

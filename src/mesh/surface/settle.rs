@@ -13,7 +13,7 @@ use outcrop_disk::error::Result;
 use outcrop_disk::spill::Inbox;
 use outcrop_disk::workspace::Unit;
 use outcrop_disk::workspace::memory::Reservation;
-use outcrop_geom::method::METHOD;
+use outcrop_paper::method::METHOD;
 use outcrop_stages::blocks::Blocks;
 use outcrop_stages::ids::GlobalLabel;
 

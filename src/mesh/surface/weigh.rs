@@ -8,7 +8,7 @@ use super::parity::signed;
 use super::patches::Patches;
 use super::star::{EdgesUp, Triangle};
 use outcrop_disk::workspace::memory::bytes_of;
-use outcrop_geom::method::METHOD;
+use outcrop_paper::method::METHOD;
 use outcrop_stages::blocks::Blocks;
 use outcrop_stages::ids::{Id, Ids, PatchNumber, TriangleIndex};
 

@@ -1,6 +1,6 @@
 //! The interface of mesh formats.
 
-use outcrop_geom::method::method_version;
+use outcrop_paper::method::method_version;
 use outcrop_ply::Scalar;
 use outcrop_points::Column;
 

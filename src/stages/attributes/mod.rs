@@ -20,7 +20,7 @@ use outcrop_disk::spill::{Row, Shuffle, Table, release, sort};
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_geom::lattice::Lattice;
-use outcrop_geom::method::METHOD;
+use outcrop_paper::method::METHOD;
 use outcrop_points::{Carried, Column, Spool, VALUE_BUFFERS};
 use rows::{Row1, Row2, Row6, Row12, Row13, Row15, Word};
 use serde::{Deserialize, Serialize};

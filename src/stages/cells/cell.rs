@@ -14,10 +14,10 @@ use crate::tiles::wanted::Wanted;
 use outcrop_disk::error::Result;
 use outcrop_geom::Point;
 use outcrop_geom::aabb::Aabb;
-use outcrop_geom::clip::wrap::Wrapper;
-use outcrop_geom::clip::{Cell, Spheres};
-use outcrop_geom::method::METHOD;
-use outcrop_geom::plane::Normal;
+use outcrop_paper::clip::wrap::Wrapper;
+use outcrop_paper::clip::{Cell, Spheres};
+use outcrop_paper::method::METHOD;
+use outcrop_paper::plane::Normal;
 use std::cell::OnceCell;
 
 /// The radius of the disk.

@@ -3,7 +3,7 @@
 use crate::ids::Id;
 use crate::normals::{Given, InputNormals, Normals};
 use outcrop_disk::workspace::memory::bytes_of;
-use outcrop_geom::plane::{Moments, Normal};
+use outcrop_paper::plane::{Moments, Normal};
 use serde::{Deserialize, Serialize};
 
 /// The normals that points bring, and what is done with them.

@@ -7,9 +7,9 @@ use crate::tiles::neighbors::Neighbors;
 use crate::tiles::walk::{PageCache, Walk};
 use outcrop_disk::error::Result;
 use outcrop_geom::Point;
-use outcrop_geom::kernels::Level;
-use outcrop_geom::method::METHOD;
-use outcrop_geom::plane::{Moments, Plane};
+use outcrop_paper::kernels::Level;
+use outcrop_paper::method::METHOD;
+use outcrop_paper::plane::{Moments, Plane};
 
 /// A source of the neighbours of a point.
 pub(super) trait Source {

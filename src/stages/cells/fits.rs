@@ -11,8 +11,8 @@ use outcrop_disk::error::Result;
 use outcrop_disk::workspace::Unit;
 use outcrop_disk::workspace::memory::Holding;
 use outcrop_geom::Point;
-use outcrop_geom::kernels::Level;
-use outcrop_geom::plane::{Moments, PLANES, planes};
+use outcrop_paper::kernels::Level;
+use outcrop_paper::plane::{Moments, PLANES, planes};
 use std::cell::RefCell;
 use std::ops::Range;
 

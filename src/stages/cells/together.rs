@@ -5,9 +5,9 @@ use super::fit::Fit;
 use crate::ids::Id;
 use crate::spacing::Nearby;
 use crate::tiles::near::{Group, Neighborhood};
-use outcrop_geom::clip::wrap::{Site, TOGETHER};
-use outcrop_geom::kernels::Level;
-use outcrop_geom::plane::{Moments, PLANES, Plane, planes};
+use outcrop_paper::clip::wrap::{Site, TOGETHER};
+use outcrop_paper::kernels::Level;
+use outcrop_paper::plane::{Moments, PLANES, Plane, planes};
 
 impl CellMaker<'_> {
     /// Computes the cells of all members whose outlines are certified, by themselves or with farther points.

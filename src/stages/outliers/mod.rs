@@ -21,7 +21,7 @@ use outcrop_disk::error::Result;
 use outcrop_disk::spill::Table;
 use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_geom::Point;
-use outcrop_geom::method::METHOD;
+use outcrop_paper::method::METHOD;
 use serde::{Deserialize, Serialize};
 use spacing::{SpacingCache, Spacings};
 use std::ops::Range;

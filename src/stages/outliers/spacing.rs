@@ -10,7 +10,7 @@ use outcrop_disk::error::Result;
 use outcrop_disk::spill::{Table, release, row};
 use outcrop_disk::workspace::memory::Holding;
 use outcrop_disk::workspace::{Unit, Workspace};
-use outcrop_geom::method::METHOD;
+use outcrop_paper::method::METHOD;
 use rustc_hash::FxHashMap;
 use std::ops::Range;
 

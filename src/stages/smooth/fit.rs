@@ -1,9 +1,9 @@
 //! Least-squares surfaces of first and second order, fitted for several points at a time.
 
-pub use outcrop_geom::kernels::eight::{Eight, loaded, stored};
-pub use outcrop_geom::kernels::numbers::Numbers;
-use outcrop_geom::kernels::{LANES, SurfaceSums, kernel};
-use outcrop_geom::method::METHOD;
+pub use outcrop_paper::kernels::eight::{Eight, loaded, stored};
+pub use outcrop_paper::kernels::numbers::Numbers;
+use outcrop_paper::kernels::{LANES, SurfaceSums, kernel};
+use outcrop_paper::method::METHOD;
 
 /// Unknowns of a plane over a frame.
 const PLANE: usize = 3;
@@ -187,7 +187,7 @@ pub(super) fn share_if<F: Numbers>(bits: u64, share: F) -> F {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use outcrop_geom::kernels::Level;
+    use outcrop_paper::kernels::Level;
     use proptest::prelude::*;
 
     /// Sums over positions `u, v, h, w`.

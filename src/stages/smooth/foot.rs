@@ -9,14 +9,14 @@
 use super::fit::{Fit, TERMS, fits, share_if};
 use super::level::{frame, unit};
 use crate::tiles::near::Around;
-pub use outcrop_geom::kernels::eight::{Eight, loaded, stored};
-use outcrop_geom::kernels::numbers::Numbers;
-use outcrop_geom::kernels::{
+pub use outcrop_paper::kernels::eight::{Eight, loaded, stored};
+use outcrop_paper::kernels::numbers::Numbers;
+use outcrop_paper::kernels::{
     LANES, Level, SpreadSums, SurfaceSums, Weighted, drop_beyond, fade, kernel, square_weights,
     take_weighted, turn,
 };
-use outcrop_geom::method::METHOD;
-use outcrop_geom::plane::{Normal, least_directions};
+use outcrop_paper::method::METHOD;
+use outcrop_paper::plane::{Normal, least_directions};
 
 /// Two directions along a plane, and its normal, for several points.
 type Frames = [[[f64; LANES]; 3]; 3];

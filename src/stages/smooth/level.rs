@@ -8,10 +8,10 @@ use crate::cells::Fit;
 use crate::levels::HIGHEST;
 use crate::spacing::spacing2;
 use crate::tiles::neighbors::Neighbors;
-use outcrop_geom::kernels::eight::{Eight, loaded};
-use outcrop_geom::kernels::numbers::Numbers;
-use outcrop_geom::kernels::{LANES, Level, kernel};
-use outcrop_geom::method::METHOD;
+use outcrop_paper::kernels::eight::{Eight, loaded};
+use outcrop_paper::kernels::numbers::Numbers;
+use outcrop_paper::kernels::{LANES, Level, kernel};
+use outcrop_paper::method::METHOD;
 
 /// Unknowns of a surface of second order.
 const TERMS: usize = 6;

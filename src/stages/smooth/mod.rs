@@ -26,8 +26,8 @@ use outcrop_disk::error::Result;
 use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_geom::Point;
 use outcrop_geom::lattice::COORDINATE_LIMIT;
-use outcrop_geom::method::METHOD;
 use outcrop_geom::round::rounded;
+use outcrop_paper::method::METHOD;
 use pass::Pass;
 use std::ops::Range;
 

@@ -5,7 +5,7 @@ use super::{Relaxing, moved};
 use crate::spacing::spacing2;
 use crate::tiles::near::{Around, Nearer};
 use outcrop_geom::Point;
-use outcrop_geom::method::METHOD;
+use outcrop_paper::method::METHOD;
 
 /// The squared distance, in steps, up to which a point with neighbours that reach this far, squared, has a foot, and
 /// the next point may follow it.

@@ -13,7 +13,7 @@ use crate::tiles::walk::PageCache;
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_disk::workspace::{Unit, Workspace};
-use outcrop_geom::method::METHOD;
+use outcrop_paper::method::METHOD;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 

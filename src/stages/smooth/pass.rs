@@ -8,7 +8,7 @@ use outcrop_disk::error::Result;
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_geom::Point;
-use outcrop_geom::method::METHOD;
+use outcrop_paper::method::METHOD;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::ops::Range;

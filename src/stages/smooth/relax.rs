@@ -18,7 +18,7 @@ use crate::spacing::StoredSpacings;
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_geom::Point;
-use outcrop_geom::method::METHOD;
+use outcrop_paper::method::METHOD;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 

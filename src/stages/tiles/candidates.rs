@@ -5,7 +5,7 @@ use crate::ids::Id;
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_geom::Point;
 use outcrop_geom::aabb::Aabb;
-use outcrop_geom::kernels::{
+use outcrop_paper::kernels::{
     BLOCK, CoveredBoxes, Level, Pick, SearchBox, first_bits, kernel, near_boxes, point_box_body,
     take_boxes,
 };

@@ -1,7 +1,7 @@
 //! Points of a tile that can be neighbours, where others cannot.
 
 use outcrop_disk::workspace::memory::bytes_of;
-use outcrop_geom::kernels::BLOCK;
+use outcrop_paper::kernels::BLOCK;
 
 /// One bit for each point of a tile.
 #[derive(Debug)]

@@ -6,7 +6,7 @@ use super::candidates::within;
 use crate::ids::PageNumber;
 use crate::order::PointStore;
 use outcrop_geom::aabb::Aabb;
-use outcrop_geom::kernels::{BLOCK, CoveredBoxes, Level, near_boxes};
+use outcrop_paper::kernels::{BLOCK, CoveredBoxes, Level, near_boxes};
 
 /// Most pages within the reach of a page; a reach that touches more is shortened.
 const MOST_NEAR: usize = 96;

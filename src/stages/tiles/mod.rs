@@ -20,7 +20,7 @@ use halo::{Reach, halo};
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_geom::aabb::Aabb;
-use outcrop_geom::kernels::{BLOCK, Boxes};
+use outcrop_paper::kernels::{BLOCK, Boxes};
 use points::Points;
 use std::ops::Range;
 

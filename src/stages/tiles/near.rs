@@ -10,8 +10,8 @@ use super::{OwnPage, Tile};
 use crate::ids::Id;
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_geom::aabb::Aabb;
-use outcrop_geom::kernels::{BLOCK, Level};
 use outcrop_geom::{Point, distance2};
+use outcrop_paper::kernels::{BLOCK, Level};
 use std::ops::Range;
 
 mod around;

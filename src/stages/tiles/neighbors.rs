@@ -3,9 +3,9 @@
 use super::Near;
 use crate::ids::Id;
 use outcrop_disk::workspace::memory::bytes_of;
-use outcrop_geom::clip::Nearest;
-use outcrop_geom::kernels::{Level, MOST_SUMMED, SUMMED_LIMIT2, second_moments};
-use outcrop_geom::plane::Moments;
+use outcrop_paper::clip::Nearest;
+use outcrop_paper::kernels::{Level, MOST_SUMMED, SUMMED_LIMIT2, second_moments};
+use outcrop_paper::plane::Moments;
 
 /// Sums over the nearest neighbours of a point.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

@@ -4,7 +4,7 @@ use outcrop_disk::error::Result;
 use outcrop_disk::workspace::memory::bytes_of;
 use outcrop_geom::Point;
 use outcrop_geom::aabb::Aabb;
-use outcrop_geom::kernels::{BLOCK, Level, kernel};
+use outcrop_paper::kernels::{BLOCK, Level, kernel};
 use std::ops::Range;
 
 /// Points in columns that are a block longer than the number of points, so that a whole block can be read

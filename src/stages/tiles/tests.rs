@@ -7,9 +7,9 @@ use super::wanted::Wanted;
 use super::*;
 use crate::order::Orderer;
 use outcrop_disk::workspace::Workspace;
-use outcrop_geom::kernels::Level;
-use outcrop_geom::plane::Moments;
 use outcrop_geom::{Point, distance2};
+use outcrop_paper::kernels::Level;
+use outcrop_paper::plane::Moments;
 use proptest::prelude::*;
 
 /// The store of a cloud in pages of `page` points, its workspace, and its points by id.

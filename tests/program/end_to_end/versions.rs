@@ -5,7 +5,7 @@ use outcrop::params::Params;
 use outcrop_cloudgen::{Cloud, Kind};
 
 /// The version, and checksums of meshes without their headers. If a mesh has changed on purpose, raise
-/// `method_version` in `src/geom/method.rs` (once for each release), write the checksum that the test found, a row of
+/// `method_version` in `src/paper/method.rs` (once for each release), write the checksum that the test found, a row of
 /// docs/versions.md and an entry of the changelog that says **Meshes change**.
 const VERSION: u64 = 3;
 const MESHES: [(&str, u32); 8] = [

@@ -1,7 +1,7 @@
 //! Other methods for normals, for comparison.
 
-use outcrop_geom::kernels::Level;
-use outcrop_geom::plane::{Moments, Plane, least_direction};
+use outcrop_paper::kernels::Level;
+use outcrop_paper::plane::{Moments, Plane, least_direction};
 use outcrop_stages::tiles::neighbors::Neighbors;
 
 /// A method for normals.

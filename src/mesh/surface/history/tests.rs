@@ -2,7 +2,7 @@
 
 use super::super::contract::Limit;
 use super::*;
-use outcrop_geom::method::METHOD;
+use outcrop_paper::method::METHOD;
 use proptest::prelude::*;
 use std::collections::BTreeSet;
 

@@ -4,7 +4,7 @@ use super::super::evidence::{Division, cosine, weight};
 use super::super::star::opposed;
 use super::*;
 use outcrop_geom::Point;
-use outcrop_geom::method::METHOD;
+use outcrop_paper::method::METHOD;
 use outcrop_stages::ids::{Id, triangle};
 use outcrop_stages::located::Located;
 use proptest::prelude::*;

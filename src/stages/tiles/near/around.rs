@@ -5,8 +5,8 @@ use super::{OwnPage, Search, above};
 use crate::ids::Id;
 use crate::tiles::neighbors::Neighbors;
 use crate::tiles::{Near, Tile};
-use outcrop_geom::kernels::{BLOCK, Level, Pick, distances_body, kernel};
 use outcrop_geom::{Point, distance2};
+use outcrop_paper::kernels::{BLOCK, Level, Pick, distances_body, kernel};
 
 /// A point and its nearest neighbours, in order of id, in columns that end with zeros to whole groups of
 /// eight.

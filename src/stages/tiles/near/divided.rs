@@ -4,7 +4,7 @@
 use super::Search;
 use super::sums::divided_body;
 use outcrop_geom::Point;
-use outcrop_geom::kernels::{BLOCK, Pick, kernel};
+use outcrop_paper::kernels::{BLOCK, Pick, kernel};
 
 kernel! {
     /// Measures the candidates from `point` and lists the `k` nearest neighbours and no others. Returns the squared

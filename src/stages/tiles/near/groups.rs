@@ -4,10 +4,10 @@ use super::sums::{Unknown, certain_body, divided_body};
 use super::{APPROXIMATE, OwnPage, Query, Search, Sums};
 use crate::ids::Id;
 use crate::tiles::Tile;
-use outcrop_geom::clip::wrap::{MOST_NEIGHBORS, TOGETHER};
-use outcrop_geom::kernels::{BLOCK, Pick, SUMMED_LIMIT2, kernel, second_moments_body};
-use outcrop_geom::plane::Moments;
 use outcrop_geom::{Point, distance2};
+use outcrop_paper::clip::wrap::{MOST_NEIGHBORS, TOGETHER};
+use outcrop_paper::kernels::{BLOCK, Pick, SUMMED_LIMIT2, kernel, second_moments_body};
+use outcrop_paper::plane::Moments;
 use std::ops::Range;
 
 /// Factor, in squared distance, by which a leaf's candidates are gathered farther for members with too few.

@@ -5,11 +5,11 @@ use crate::ids::Id;
 use crate::tiles::Near;
 use crate::tiles::candidates::Columns;
 use crate::tiles::neighbors::Neighbors;
-use outcrop_geom::kernels::{
+use outcrop_geom::{Point, distance2, sub};
+use outcrop_paper::kernels::{
     BLOCK, Pick, RANKED, SHORT_RANKED, count_body, distances_body, first_bits, kernel, pick_body,
     ranks_body, short_ranks_body,
 };
-use outcrop_geom::{Point, distance2, sub};
 use std::ops::RangeInclusive;
 
 /// Up to this number, keys are sorted by counting.

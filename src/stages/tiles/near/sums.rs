@@ -7,8 +7,8 @@ use crate::ids::Id;
 use crate::tiles::Tile;
 use crate::tiles::neighbors::Sums;
 use outcrop_geom::Point;
-use outcrop_geom::kernels::{BLOCK, MOST_SUMMED, Pick, SUMMED_LIMIT2, distances_body, kernel};
-use outcrop_geom::plane::Moments;
+use outcrop_paper::kernels::{BLOCK, MOST_SUMMED, Pick, SUMMED_LIMIT2, distances_body, kernel};
+use outcrop_paper::plane::Moments;
 
 /// Most corrections of the limit that separates the nearest from the others.
 const DIVISIONS: usize = 16;

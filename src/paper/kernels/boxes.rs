@@ -238,7 +238,7 @@ pub fn point_box_body([x, y, z]: [&[i32]; 3], min: [i32; 3], max: [i32; 3], out:
 mod tests {
     use super::super::Level;
     use super::*;
-    use crate::aabb::Aabb;
+    use outcrop_geom::aabb::Aabb;
     use proptest::prelude::*;
 
     proptest! {

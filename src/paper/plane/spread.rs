@@ -3,7 +3,7 @@
 use super::{NORMAL_SCALE, Normal};
 use crate::kernels::numbers::Numbers;
 use crate::method::METHOD;
-use crate::round::rounded;
+use outcrop_geom::round::rounded;
 
 /// A scatter matrix that is not zero, divided by the largest of its diagonal, and its eigenvalues.
 #[derive(Debug, Clone, Copy)]

@@ -11,7 +11,6 @@ mod hull;
 use super::lines::meet_columns;
 use super::touch::differences;
 use super::{RIM_DISTANCE, secure2};
-use crate::Point;
 use crate::kernels::eight::{Eight, loaded, stored};
 use crate::kernels::sixteen::Sixteen;
 use crate::kernels::{
@@ -19,6 +18,7 @@ use crate::kernels::{
 };
 use crate::plane::Normal;
 use hull::hulls;
+use outcrop_geom::Point;
 
 /// Most points whose cells are computed together, one in each lane.
 pub const TOGETHER: usize = 16;

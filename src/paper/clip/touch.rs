@@ -1,9 +1,9 @@
 //! Conservative tests whether boxes and points can touch a cell.
 
 use super::{Cell, RIM_PLACES};
-use crate::Point;
 use crate::kernels::eight::Eight;
 use crate::kernels::{LANES, Place, bisectors_body, kernel, touching_body, touching_places_body};
+use outcrop_geom::Point;
 
 /// Groups of spheres and places of corners in memory of fixed size; cells with more corners do without.
 const GROUPS: usize = 2 * RIM_PLACES / LANES;

@@ -35,7 +35,7 @@ pub fn count_body(numbers: &[f32], limit: f32) -> usize {
 mod tests {
     use super::super::Level;
     use super::*;
-    use crate::distance2;
+    use outcrop_geom::distance2;
     use proptest::prelude::*;
 
     proptest! {
