@@ -8,6 +8,8 @@ mod noted;
 mod send;
 #[cfg_attr(not(feature = "cloud"), path = "deliver/without.rs")]
 mod there;
+#[cfg(feature = "cloud")]
+mod uploads;
 
 use outcrop_points::is_remote;
 use serde::{Deserialize, Serialize};

@@ -101,7 +101,7 @@ impl Notes {
                 .filter_map(|line| serde_json::from_str(line).ok())
                 .collect()),
             Err(e) if e.kind() == ErrorKind::NotFound => Ok(Vec::new()),
-            Err(e) => Err(Error::io(&self.0, "read", e)),
+            Err(e) => Err(Error::io(&self.0, "read the notes about uploads", e)),
         }
     }
 

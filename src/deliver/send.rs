@@ -7,9 +7,9 @@ use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_mesh_files::export::is_compressed;
 use outcrop_platform::FileAt;
-use outcrop_remote::{Bucket, Location, Object};
+use outcrop_remote::{Bucket, Location, Object, Whole};
 use std::fs::File;
-use std::io::{self, ErrorKind};
+use std::io::{self, BufReader, ErrorKind, Read};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -81,6 +81,10 @@ impl Delivery {
                 Ok(names)
             })?;
         }
+        let names = earlier
+            .iter()
+            .map(|name| (size_of::<String>() + name.len()) as u64);
+        let _names = workspace.reserve("upload: earlier files", names.sum())?;
         let (small, large): (Vec<&Sent>, Vec<&Sent>) =
             before.iter().partition(|file| file.bytes <= PART);
         self.small("small files", &small, &bucket, workspace)?;
@@ -191,7 +195,7 @@ impl Delivery {
         if notes.state(&file.name)?.whole {
             return Ok(true);
         }
-        let Some(upload) = self.begun(bucket, &file.name)? else {
+        let Some(upload) = self.begun(bucket, &file.name, &*workspace.observer)? else {
             return Ok(false);
         };
         let state = notes.state(&file.name)?;
@@ -289,9 +293,8 @@ impl Delivery {
 fn tells_of(at: &Location, mesh: &str) -> bool {
     let read = || -> io::Result<serde_json::Value> {
         let object = Object::open(at, &Arc::default())?;
-        let mut bytes = vec![0; object.size().min(LONGEST) as usize];
-        let read = object.read_at(&mut bytes, 0)?;
-        Ok(serde_json::from_slice(&bytes[..read])?)
+        let whole = Whole::of(&object)?.take(LONGEST);
+        Ok(serde_json::from_reader(BufReader::new(whole))?)
     };
     read().is_ok_and(|origin| {
         let ours = origin["made_by"]

@@ -1,6 +1,6 @@
 //! The place of an output behind a URL, and its files on this machine.
 
-use super::noted::{Note, Notes, State};
+use super::noted::{Note, Notes};
 use super::{Kind, SCRATCH, TREE, scratch_of};
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::progress::Observer;
@@ -133,8 +133,8 @@ impl Delivery {
     }
 
     /// Begins anew: gives up what an earlier run left, and makes sure that the store takes the output.
-    pub(crate) fn begin(&self) -> Result<()> {
-        if let Some((file, _, e)) = self.give_up().pop() {
+    pub(crate) fn begin(&self, observer: &dyn Observer) -> Result<()> {
+        if let Some((file, _, e)) = self.give_up(observer)?.pop() {
             let at = self.folder.below(&file).to_string();
             return Err(Error::io(at, "give up an unfinished upload to", e));
         }
@@ -150,7 +150,7 @@ impl Delivery {
             Kind::Folder => TREE,
             Kind::Mesh => &self.name,
         };
-        if let Some(upload) = self.begun(&bucket, probe)? {
+        if let Some(upload) = self.begun(&bucket, probe, observer)? {
             let at = self.folder.below(probe);
             let aborted = bucket.abort(&at, &upload);
             aborted.map_err(|e| Error::io(&self.url, "give up an upload to", e))?;
@@ -162,7 +162,16 @@ impl Delivery {
 
     /// Removes everything on this machine; what is not whole in the store is given up.
     pub(crate) fn end(&self, observer: &dyn Observer) {
-        let failed = self.give_up();
+        let failed = match self.give_up(observer) {
+            Ok(failed) => failed,
+            Err(e) => {
+                observer.warn(&format!(
+                    "{e}; the store may hold parts of unfinished uploads that they name, so they are kept"
+                ));
+                let _ = std::fs::remove_dir_all(self.files_folder());
+                return;
+            }
+        };
         // It does no harm if they cannot be deleted.
         let _ = match failed.is_empty() {
             true => std::fs::remove_dir_all(&self.staging),
@@ -193,13 +202,12 @@ impl Delivery {
     /// The files in the store below the folder.
     pub(super) fn existing(&self) -> Result<Vec<String>> {
         let folder = self.folder.below("");
-        let listed = outcrop_remote::list(&folder, MOST, &Arc::default());
+        let listed = outcrop_remote::list(&folder, MOST, |_| true, &Arc::default());
         let listed = listed.map_err(|e| Error::io(&self.url, "list the files of", e))?;
         let start = folder.to_string();
-        let names = listed.into_iter().filter_map(|file| {
-            let url = file.location.to_string();
-            url.strip_prefix(&start).map(ToOwned::to_owned)
-        });
+        let names = listed
+            .into_iter()
+            .filter_map(|file| file.url.strip_prefix(&start).map(ToOwned::to_owned));
         Ok(names.collect())
     }
 
@@ -224,90 +232,6 @@ impl Delivery {
             }
         }
     }
-
-    /// Gives up the uploads that are open; returns the files and uploads of which that failed.
-    fn give_up(&self) -> Vec<(String, String, std::io::Error)> {
-        let notes = self.notes();
-        let open = notes.open().unwrap_or_default();
-        if open.is_empty() {
-            return Vec::new();
-        }
-        let bucket = self.bucket(false);
-        let mut failed = Vec::new();
-        for (file, state) in open {
-            let tried = match &bucket {
-                Ok(bucket) => self.abort(bucket, &file, &state),
-                Err(e) => Err(std::io::Error::other(e.to_string())),
-            };
-            let gone = Note::Gone { file: file.clone() };
-            let noted = tried.and_then(|()| notes.add(&gone).map_err(std::io::Error::other));
-            if let Err(e) = noted {
-                failed.push((file, state.upload.unwrap_or_default(), e));
-            }
-        }
-        failed
-    }
-
-    /// Gives up what may be open of a file.
-    pub(super) fn abort(&self, bucket: &Bucket, file: &str, state: &State) -> std::io::Result<()> {
-        let at = self.folder.below(file);
-        if let Some(upload) = &state.upload {
-            return bucket.abort(&at, upload);
-        }
-        let Some(Some(others)) = &state.begin else {
-            return Ok(());
-        };
-        abort_all_but(bucket, &at, others)
-    }
-
-    /// Begins an upload, or goes on with the one that is open. None if the store knows no parts.
-    pub(super) fn begun(&self, bucket: &Bucket, file: &str) -> Result<Option<String>> {
-        let (notes, at) = (self.notes(), self.folder.below(file));
-        let failed = |e| Error::io(at.to_string(), "begin an upload to", e);
-        let state = notes.state(file)?;
-        if let Some(upload) = state.upload {
-            return Ok(Some(upload));
-        }
-        // The process ended while it began one.
-        self.abort(bucket, file, &state).map_err(failed)?;
-        let before = bucket.existing(&at).ok().flatten();
-        let others = bucket.unfinished(&at).ok();
-        notes.add(&Note::Begin {
-            file: file.to_owned(),
-            others: others.clone(),
-            before: before.and_then(|before| before.tag),
-        })?;
-        let asked = bucket.requests();
-        let file = file.to_owned();
-        match bucket.begin(&at, media_type(&file)) {
-            Ok(upload) => {
-                if let (Some(mut known), true) = (others, bucket.requests() > asked + 1) {
-                    // The request was repeated, and each may have begun one.
-                    known.push(upload.clone());
-                    abort_all_but(bucket, &at, &known).map_err(failed)?;
-                }
-                notes.add(&Note::Begun {
-                    file,
-                    upload: upload.clone(),
-                })?;
-                Ok(Some(upload))
-            }
-            Err(e) if e.kind() == ErrorKind::Unsupported => {
-                notes.add(&Note::Gone { file })?;
-                Ok(None)
-            }
-            Err(e) => Err(failed(e)),
-        }
-    }
-}
-
-/// Gives up all uploads of a file but these.
-fn abort_all_but(bucket: &Bucket, at: &Location, known: &[String]) -> std::io::Result<()> {
-    let unfinished = bucket.unfinished(at)?.into_iter();
-    for upload in unfinished.filter(|upload| !known.contains(upload)) {
-        bucket.abort(at, &upload)?;
-    }
-    Ok(())
 }
 
 /// A path with an ending after its name.

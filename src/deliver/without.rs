@@ -45,7 +45,7 @@ impl Delivery {
         match *self {}
     }
 
-    pub(crate) fn begin(&self) -> Result<()> {
+    pub(crate) fn begin(&self, _: &dyn Observer) -> Result<()> {
         match *self {}
     }
 

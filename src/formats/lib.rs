@@ -46,6 +46,10 @@ use outcrop_points::{Attributes, IngestStats, Layout, Selection, Spool};
 use reading::{Opened, read_all};
 use std::path::PathBuf;
 
+/// Inputs whose names and figures are not reserved, and what each of more takes besides its name.
+const FEW_INPUTS: usize = 1 << 10;
+const PER_INPUT: u64 = 1 << 10;
+
 /// Decodes all inputs, which may be files and folders, into a spool.
 ///
 /// Progress is reported to the observer; the caller begins and ends the stage. Memory is reserved for each
@@ -69,6 +73,7 @@ pub fn ingest_selected(
 ) -> Result<Spool> {
     let expanded = expand::expanded(inputs)?;
     let paths = &expanded.files;
+    keep_names(paths, workspace)?;
     check_columns(paths, selection)?;
     let name = format!("ingest-{}.spool", workspace.number());
     let mut stats = IngestStats::default();
@@ -91,6 +96,16 @@ pub fn ingest_selected(
         workspace.files.release(&values_of(&name))?;
     }
     spool
+}
+
+/// Reserves what is kept of many inputs, for as long as the process lives.
+fn keep_names(paths: &[PathBuf], workspace: &Workspace) -> Result<()> {
+    if paths.len() <= FEW_INPUTS {
+        return Ok(());
+    }
+    let names = paths.iter().map(|path| path.as_os_str().len() as u64);
+    let bytes = paths.len() as u64 * PER_INPUT + 4 * names.sum::<u64>();
+    workspace.memory.keep("inputs", bytes)
 }
 
 /// Refuses columns that are in none of the files.

@@ -72,7 +72,7 @@ impl Reconstruction {
             && !matches!((&found, self.start), (Found::Run(_), Start::Resume))
         {
             delivery
-                .begin()
+                .begin(&*self.observer)
                 .inspect_err(|_| delivery.end(&*self.observer))?;
         }
         let mut folder = match (found, self.start) {

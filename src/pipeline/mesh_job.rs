@@ -164,7 +164,7 @@ impl<O: Clone + Serialize> MeshJob<'_, O> {
                 (Found::Run(_), Start::Resume)
             )
         {
-            let begun = delivery.begin();
+            let begun = delivery.begin(&*self.resources.observer);
             begun.inspect_err(|_| delivery.end(&*self.resources.observer))?;
         }
         let folder = match (found, self.resources.start) {

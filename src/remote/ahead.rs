@@ -1,37 +1,29 @@
 //! Ranges that are fetched before they are read: while points are decoded, the next ones are on their way.
 //!
-//! Ranges are joined and cut to pieces. Threads fetch one piece after another, as long as those that wait for a reader
-//! hold no more than the memory that they were given. A reader that is ahead of them fetches its piece itself; so
-//! nobody waits for room.
+//! Ranges are joined and cut to pieces. Threads fetch one piece after another, as long as the pieces hold no more than
+//! the memory that they were given; one that readers have taken what was wanted of is freed. A reader that is ahead of
+//! the threads fetches its piece itself, or, if there is no room for it, only what it reads; so nobody waits for room.
 
+#[cfg(test)]
+mod tests;
+
+use super::pieces::{Piece, pieces};
 use bytes::Bytes;
 use std::io;
 use std::ops::Range;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
-
-/// Most bytes of a piece: at 100 MB/s a request of it takes 40 ms, of which 10 are spent waiting.
-pub(crate) const PIECE: u64 = 4 << 20;
-
-/// Ranges with a smaller gap between them are one request.
-const GAP: u64 = 16 << 10;
 
 /// Most requests at the same time.
 const REQUESTS: usize = 8;
 
-/// A piece and what is known of it.
-#[derive(Debug)]
-struct Piece {
-    range: Range<u64>,
-    state: State,
-}
-
+/// What is known of a piece.
 #[derive(Debug)]
 enum State {
     Waiting,
     Asked,
-    /// Fetched, with the bytes that no reader has taken yet.
-    Here(Bytes, u64),
+    Here(Bytes),
     /// Taken, or failed: readers ask for what they want.
     Gone,
 }
@@ -39,13 +31,31 @@ enum State {
 /// Pieces in the order of their places, and which one is next.
 #[derive(Debug)]
 struct Pieces {
-    all: Vec<Piece>,
+    all: Vec<(Piece, State)>,
     /// The order in which they are read.
     order: Vec<usize>,
     next: usize,
     /// Bytes that are asked for or here.
     held: u64,
     ended: bool,
+}
+
+/// Memory for pieces, and who fetches them.
+#[derive(Debug, Clone, Copy)]
+pub struct Room {
+    /// Most bytes that pieces hold. What has no room is not kept: its reader asks for it alone.
+    pub bytes: u64,
+    /// True if threads fetch pieces in the order of reading; else a piece is fetched when it is read first.
+    pub is_ahead: bool,
+}
+
+/// What a reader finds.
+#[derive(Debug, PartialEq, Eq)]
+pub(crate) enum Got {
+    /// So many bytes are in its buffer.
+    Copied(usize),
+    /// So many bytes are not here: it asks for them itself.
+    Absent(usize),
 }
 
 /// Fetches the piece of this number and range.
@@ -74,42 +84,38 @@ struct Shared {
 }
 
 impl Ahead {
-    /// Pieces of these ranges of one file. Without memory for a piece, each is fetched when it is read first.
+    /// Pieces of these ranges of one file.
     pub(crate) fn of_ranges(
         ranges: impl IntoIterator<Item = Range<u64>>,
-        bytes: u64,
+        room: Room,
         fetch: impl Fn(Range<u64>) -> io::Result<Bytes> + Send + Sync + 'static,
     ) -> Self {
-        Self::new(
-            pieces(ranges),
-            bytes,
-            Box::new(move |_, range| fetch(range)),
-        )
+        Self::new(pieces(ranges), room, Box::new(move |_, range| fetch(range)))
     }
 
     /// Files that are pieces, of at most so many bytes each, in the order in which they are read.
     pub(crate) fn of_files(
         sizes: impl IntoIterator<Item = u64>,
-        bytes: u64,
+        room: Room,
         fetch: impl Fn(usize) -> io::Result<Bytes> + Send + Sync + 'static,
     ) -> Self {
         let mut end = 0;
         let place = |size: u64| {
             let start = end;
             end += size.max(1);
-            start..end
+            Piece::whole(start..end)
         };
-        let all: Vec<Range<u64>> = sizes.into_iter().map(place).collect();
+        let all: Vec<Piece> = sizes.into_iter().map(place).collect();
         let order = (0..all.len()).collect();
-        Self::new((all, order), bytes, Box::new(move |file, _| fetch(file)))
+        Self::new((all, order), room, Box::new(move |file, _| fetch(file)))
     }
 
-    fn new((all, order): (Vec<Range<u64>>, Vec<usize>), bytes: u64, fetch: Fetch) -> Self {
-        let threads = REQUESTS.min(all.len()) * usize::from(bytes > 0);
-        let all = all.into_iter().map(|range| Piece {
-            range,
-            state: State::Waiting,
-        });
+    fn new((all, order): (Vec<Piece>, Vec<usize>), room: Room, fetch: Fetch) -> Self {
+        let threads = match room.is_ahead && room.bytes > 0 {
+            true => REQUESTS.min(all.len()),
+            false => 0,
+        };
+        let all = all.into_iter().map(|piece| (piece, State::Waiting));
         let shared = Arc::new(Shared {
             pieces: Mutex::new(Pieces {
                 all: all.collect(),
@@ -120,7 +126,7 @@ impl Ahead {
             }),
             changed: Condvar::new(),
             fetch,
-            most: bytes,
+            most: room.bytes,
         });
         let thread = |_| {
             let shared = shared.clone();
@@ -131,25 +137,25 @@ impl Ahead {
         Self { shared, threads }
     }
 
-    /// Fills `buffer` from `offset` as far as the piece there reaches; none outside of all pieces.
-    pub(crate) fn read(&self, buffer: &mut [u8], offset: u64) -> io::Result<Option<usize>> {
+    /// Fills `buffer` from `offset` as far as the piece there reaches, or says how far nothing is here.
+    pub(crate) fn read(&self, buffer: &mut [u8], offset: u64) -> io::Result<Got> {
         self.shared.read(buffer, offset)
     }
 
     /// All of a file that is a piece; it is taken once.
     pub(crate) fn take(&self, file: usize) -> io::Result<Bytes> {
         let mut pieces = self.shared.here(self.shared.lock(), file)?;
-        let piece = &mut pieces.all[file];
-        match std::mem::replace(&mut piece.state, State::Gone) {
-            State::Here(bytes, _) => {
+        let (piece, state) = &mut pieces.all[file];
+        match std::mem::replace(state, State::Gone) {
+            State::Here(bytes) => {
                 self.shared.free(pieces, bytes.len() as u64);
                 Ok(bytes)
             }
-            // It was taken before, or a thread failed to fetch it.
+            // It was taken before, or a thread failed to fetch it, or there is no room for it.
             _ => {
                 let range = piece.range.clone();
-                drop(pieces);
-                (self.shared.fetch)(file, range)
+                self.shared.free(pieces, 0);
+                self.shared.fetch(file, range)
             }
         }
     }
@@ -166,36 +172,6 @@ impl Drop for Ahead {
     }
 }
 
-/// Pieces sorted by place, and their numbers in the order in which they are read first.
-fn pieces(ranges: impl IntoIterator<Item = Range<u64>>) -> (Vec<Range<u64>>, Vec<usize>) {
-    let mut given: Vec<(Range<u64>, usize)> = ranges
-        .into_iter()
-        .filter(|range| !range.is_empty())
-        .zip(0..)
-        .collect();
-    given.sort_by_key(|(range, _)| (range.start, range.end));
-    let mut joined: Vec<(Range<u64>, usize)> = Vec::new();
-    for (range, turn) in given {
-        match joined.last_mut() {
-            // Whole ranges come into one piece, so that a reader of one waits for one request.
-            Some((last, first))
-                if range.start <= last.end + GAP && range.end - last.start <= PIECE =>
-            {
-                last.end = last.end.max(range.end);
-                *first = turn.min(*first);
-            }
-            last => {
-                let start = last.map_or(range.start, |(last, _)| range.start.max(last.end));
-                let cuts = (start..range.end).step_by(PIECE as usize);
-                joined.extend(cuts.map(|at| (at..range.end.min(at + PIECE), turn)));
-            }
-        }
-    }
-    let mut order: Vec<usize> = (0..joined.len()).collect();
-    order.sort_by_key(|&piece| joined[piece].1);
-    (joined.into_iter().map(|(range, _)| range).collect(), order)
-}
-
 impl Shared {
     fn lock(&self) -> MutexGuard<'_, Pieces> {
         self.pieces.lock().unwrap_or_else(PoisonError::into_inner)
@@ -203,30 +179,33 @@ impl Shared {
 
     /// Fetches pieces until none is left.
     fn run(&self) {
-        while let Some((piece, range)) = self.take() {
+        while let Some((piece, range)) = self.next() {
             // What fails here is asked for again by its reader, who tells the error.
-            let got = (self.fetch)(piece, range.clone()).ok();
+            let got = self.fetch(piece, range.clone()).ok();
             self.put(piece, &range, got);
         }
     }
 
+    /// Asks for a piece. A panic is an error too: readers wait for a piece that was asked for.
+    fn fetch(&self, piece: usize, range: Range<u64>) -> io::Result<Bytes> {
+        let ask = AssertUnwindSafe(|| (self.fetch)(piece, range));
+        let panicked = |_| Err(io::Error::other("a request for it panicked"));
+        catch_unwind(ask).unwrap_or_else(panicked)
+    }
+
     /// The next piece for which there is room.
-    fn take(&self) -> Option<(usize, Range<u64>)> {
+    fn next(&self) -> Option<(usize, Range<u64>)> {
         let mut pieces = self.lock();
         loop {
             if pieces.ended {
                 return None;
             }
-            let piece = *pieces.order.get(pieces.next)?;
-            let range = pieces.all[piece].range.clone();
-            let size = range.end - range.start;
-            if !matches!(pieces.all[piece].state, State::Waiting) {
+            let number = *pieces.order.get(pieces.next)?;
+            if !matches!(pieces.all[number].1, State::Waiting) {
                 pieces.next += 1;
-            } else if pieces.held + size <= self.most {
+            } else if let Some(range) = self.ask(&mut pieces, number) {
                 pieces.next += 1;
-                pieces.held += size;
-                pieces.all[piece].state = State::Asked;
-                return Some((piece, range));
+                return Some((number, range));
             } else {
                 let woken = self.changed.wait(pieces);
                 pieces = woken.unwrap_or_else(PoisonError::into_inner);
@@ -234,44 +213,52 @@ impl Shared {
         }
     }
 
+    /// Notes that a piece is asked for; none if there is no room for it.
+    fn ask(&self, pieces: &mut Pieces, number: usize) -> Option<Range<u64>> {
+        let (piece, state) = &mut pieces.all[number];
+        let held = pieces.held + piece.bytes();
+        if held > self.most {
+            return None;
+        }
+        pieces.held = held;
+        *state = State::Asked;
+        Some(piece.range.clone())
+    }
+
     fn put(&self, piece: usize, range: &Range<u64>, got: Option<Bytes>) {
         let mut pieces = self.lock();
         // A file may be smaller than it can be at most.
         let size = got.as_ref().map_or(0, |bytes| bytes.len() as u64);
-        pieces.all[piece].state = match got {
-            Some(bytes) => State::Here(bytes, size),
-            None => State::Gone,
-        };
+        pieces.all[piece].1 = got.map_or(State::Gone, State::Here);
         self.free(pieces, (range.end - range.start).saturating_sub(size));
     }
 
-    /// Gives memory back, and tells the threads that wait for it.
+    /// Gives memory back, and tells the threads that wait for it, or for a piece that is gone.
     fn free(&self, mut pieces: MutexGuard<'_, Pieces>, bytes: u64) {
         pieces.held = pieces.held.saturating_sub(bytes);
         drop(pieces);
         self.changed.notify_all();
     }
 
-    /// Waits until a piece is here or gone; fetches it if nobody has begun to.
+    /// Waits for a piece that was asked for. If nobody has begun to, it is fetched, or left if there is no room.
     fn here<'a>(
         &'a self,
         mut pieces: MutexGuard<'a, Pieces>,
         number: usize,
     ) -> io::Result<MutexGuard<'a, Pieces>> {
         loop {
-            let piece = &mut pieces.all[number];
-            match piece.state {
-                State::Here(..) | State::Gone => return Ok(pieces),
+            match pieces.all[number].1 {
+                State::Here(_) | State::Gone => return Ok(pieces),
                 State::Asked => {
                     let woken = self.changed.wait(pieces);
                     pieces = woken.unwrap_or_else(PoisonError::into_inner);
                 }
                 State::Waiting => {
-                    let range = piece.range.clone();
-                    piece.state = State::Asked;
-                    pieces.held += range.end - range.start;
+                    let Some(range) = self.ask(&mut pieces, number) else {
+                        return Ok(pieces);
+                    };
                     drop(pieces);
-                    let (got, failed) = match (self.fetch)(number, range.clone()) {
+                    let (got, failed) = match self.fetch(number, range.clone()) {
                         Ok(bytes) => (Some(bytes), None),
                         Err(e) => (None, Some(e)),
                     };
@@ -285,54 +272,42 @@ impl Shared {
         }
     }
 
-    fn read(&self, buffer: &mut [u8], offset: u64) -> io::Result<Option<usize>> {
+    fn read(&self, buffer: &mut [u8], offset: u64) -> io::Result<Got> {
         let pieces = self.lock();
-        let after = pieces.all.partition_point(|p| p.range.start <= offset);
-        let Some(number) = after.checked_sub(1) else {
-            return Ok(None);
+        let after = pieces
+            .all
+            .partition_point(|(piece, _)| piece.range.start <= offset);
+        let before = after.checked_sub(1);
+        let inside = before.filter(|&number| offset < pieces.all[number].0.range.end);
+        let Some(number) = inside else {
+            let next = pieces.all.get(after).map(|(piece, _)| piece.range.start);
+            return Ok(Got::Absent(upto(buffer.len(), offset, next)));
         };
-        let range = pieces.all[number].range.clone();
-        if offset >= range.end {
-            return Ok(None);
-        }
         let mut pieces = self.here(pieces, number)?;
-        let piece = &mut pieces.all[number];
-        let State::Here(bytes, left) = &mut piece.state else {
-            return Ok(None);
+        let (piece, state) = &mut pieces.all[number];
+        let done = upto(buffer.len(), offset, Some(piece.range.end));
+        piece.take(&(offset..offset + done as u64));
+        let got = match state {
+            State::Here(bytes) => {
+                let from = (offset - piece.range.start) as usize;
+                buffer[..done].copy_from_slice(&bytes[from..from + done]);
+                Got::Copied(done)
+            }
+            _ => Got::Absent(done),
         };
-        let from = &bytes[(offset - range.start) as usize..];
-        let done = buffer.len().min(from.len());
-        buffer[..done].copy_from_slice(&from[..done]);
-        *left = left.saturating_sub(done as u64);
-        if *left == 0 {
-            piece.state = State::Gone;
-            self.free(pieces, range.end - range.start);
+        if piece.is_taken() {
+            let bytes = match std::mem::replace(state, State::Gone) {
+                State::Here(bytes) => bytes.len() as u64,
+                _ => 0,
+            };
+            self.free(pieces, bytes);
         }
-        Ok(Some(done))
+        Ok(got)
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn near_ranges_are_joined_and_long_ones_cut() {
-        let (all, order) = pieces([10..20, 30..40, 1 << 20..(1 << 20) + 5]);
-        assert_eq!(all, [10..40, 1 << 20..(1 << 20) + 5]);
-        assert_eq!(order, [0, 1]);
-        let long = 3..3 + 2 * PIECE + 1;
-        let (all, _) = pieces([long.clone()]);
-        assert_eq!(all.len(), 3);
-        assert_eq!((all[0].start, all[2].end), (long.start, long.end));
-        assert!(all.windows(2).all(|w| w[0].end == w[1].start));
-    }
-
-    #[test]
-    fn the_order_is_that_of_reading_and_nothing_is_fetched_twice() {
-        let far = 100 << 20;
-        let (all, order) = pieces([far..far + 10, 0..10, 5..12, 3..3]);
-        assert_eq!(all, [0..12, far..far + 10]);
-        assert_eq!(order, [1, 0]);
-    }
+/// How many of `wanted` bytes from `offset` lie before `end`.
+fn upto(wanted: usize, offset: u64, end: Option<u64>) -> usize {
+    let most = end.map_or(u64::MAX, |end| end - offset);
+    wanted.min(usize::try_from(most).unwrap_or(usize::MAX))
 }

@@ -1,7 +1,7 @@
 //! Answers as they arrive.
 
-use super::ahead::PIECE;
 use super::errors::{changed, told};
+use super::pieces::PIECE;
 use super::wait::wait;
 use bytes::Bytes;
 use futures_util::StreamExt;
@@ -43,10 +43,7 @@ impl Answer {
         // Large enough for a piece, so that it need not be copied while it grows.
         let mut all = Vec::with_capacity(wanted.min(PIECE as usize));
         while all.len() < wanted {
-            let part = self.next()?.ok_or_else(|| {
-                let why = format!("the answer ended after {} of {wanted} bytes", all.len());
-                io::Error::new(ErrorKind::UnexpectedEof, why)
-            })?;
+            let part = self.next()?.ok_or_else(|| short(all.len(), wanted))?;
             let part = &part[..part.len().min(wanted - all.len())];
             // It grows with what has arrived, not with what a server promises.
             all.extend_from_slice(part);
@@ -56,6 +53,18 @@ impl Answer {
 }
 
 impl Answer {
+    /// Fills `buffer` with the first bytes, of which there must be as many.
+    pub(crate) fn fill(mut self, buffer: &mut [u8]) -> io::Result<()> {
+        let mut done = 0;
+        while done < buffer.len() {
+            let part = self.next()?.ok_or_else(|| short(done, buffer.len()))?;
+            let wanted = part.len().min(buffer.len() - done);
+            buffer[done..done + wanted].copy_from_slice(&part[..wanted]);
+            done += wanted;
+        }
+        Ok(())
+    }
+
     /// All bytes, which may be at most `most`.
     pub(crate) fn all(mut self, most: u64) -> io::Result<Bytes> {
         let mut all = Vec::new();
@@ -68,6 +77,12 @@ impl Answer {
         }
         Ok(all.into())
     }
+}
+
+/// The error of an answer with fewer bytes than were asked for.
+fn short(got: usize, wanted: usize) -> io::Error {
+    let why = format!("the answer ended after {got} of {wanted} bytes");
+    io::Error::new(ErrorKind::UnexpectedEof, why)
 }
 
 /// An error in the middle of an answer.

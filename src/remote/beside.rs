@@ -1,6 +1,6 @@
 //! Small files in the folder of a remote file, read whole.
 
-use super::ahead::Ahead;
+use super::ahead::{Ahead, Room};
 use super::answer::Answer;
 use super::errors::{newer, told};
 use super::object::{Object, Version, again, ask};
@@ -43,10 +43,10 @@ impl Beside {
         })
     }
 
-    /// Files that will be read in this order, each with the most bytes that it may have: fetched before, as long as
-    /// they hold at most `bytes`. A file that has changed after `begun`, in seconds since 1970, is an error.
+    /// Files that will be read in this order, each with the most bytes that it may have: fetched before, as `room`
+    /// says. A file that has changed after `begun`, in seconds since 1970, is an error.
     #[must_use]
-    pub fn expect(&self, files: Vec<(String, u64)>, bytes: u64, begun: Option<i64>) -> Expected {
+    pub fn expect(&self, files: Vec<(String, u64)>, room: Room, begun: Option<i64>) -> Expected {
         let sizes: Vec<u64> = files.iter().map(|(_, most)| *most).collect();
         let beside = self.clone();
         let fetch = move |file: usize| {
@@ -57,7 +57,7 @@ impl Beside {
                 false => Ok(bytes),
             }
         };
-        Expected(Ahead::of_files(sizes, bytes, fetch))
+        Expected(Ahead::of_files(sizes, room, fetch))
     }
 }
 

@@ -16,6 +16,7 @@ mod list;
 mod location;
 mod metadata;
 mod object;
+mod pieces;
 mod scratch;
 mod stores;
 #[cfg(test)]
@@ -26,6 +27,7 @@ mod wait;
 mod whole;
 
 pub use agent::Counts;
+pub use ahead::Room;
 pub use beside::{Beside, Expected};
 pub use list::{Listed, list};
 pub use location::Location;

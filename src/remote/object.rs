@@ -1,7 +1,7 @@
 //! A remote file that is read by ranges.
 
 use super::agent::Counts;
-use super::ahead::Ahead;
+use super::ahead::{Ahead, Got, Room};
 use super::answer::Answer;
 use super::errors::{changed, told};
 use super::location::Location;
@@ -119,20 +119,26 @@ impl Object {
         &self.file.counts
     }
 
-    /// Fetches ranges before they are read, with requests side by side that hold at most `bytes`. Replaces the
-    /// ranges of an earlier call. Ranges are in the order in which they will be read.
-    pub fn expect(&self, ranges: impl IntoIterator<Item = Range<u64>>, bytes: u64) {
+    /// Fetches ranges in pieces, which are kept until all that was asked for of them is read: before they are read, with
+    /// requests side by side, or then, as `room` says. Replaces the ranges of an earlier call. Ranges are in the order in
+    /// which they will be read. Of the first bytes, which are here, nothing is fetched.
+    pub fn expect(&self, ranges: impl IntoIterator<Item = Range<u64>>, room: Room) {
         let ahead = self.ahead.write();
         let mut ahead = ahead.unwrap_or_else(PoisonError::into_inner);
         // The threads of the earlier ones end first.
         *ahead = None;
         let file = self.file.clone();
-        *ahead = Some(Ahead::of_ranges(ranges, bytes, move |range| {
+        let head = self.head.len() as u64;
+        let ranges = ranges
+            .into_iter()
+            .map(|range| range.start.max(head)..range.end);
+        *ahead = Some(Ahead::of_ranges(ranges, room, move |range| {
             file.fetch(range)
         }));
     }
 
-    /// Fills `buffer` from `offset`, as far as the file reaches; returns the bytes read.
+    /// Fills `buffer` from `offset`, as far as the file reaches or what was fetched together; returns the bytes read,
+    /// which are none only at the end.
     ///
     /// # Errors
     /// As [`Self::open`], after minutes of failed requests; [`ErrorKind::InvalidData`] if the file has changed since
@@ -146,21 +152,23 @@ impl Object {
         if wanted == 0 {
             return Ok(0);
         }
-        let end = offset + wanted as u64;
-        if end <= self.head.len() as u64 {
-            buffer.copy_from_slice(&self.head[offset as usize..end as usize]);
-            return Ok(wanted);
-        }
-        let ahead = self.ahead.read().unwrap_or_else(PoisonError::into_inner);
-        if let Some(ahead) = &*ahead
-            && let Some(done) = ahead.read(buffer, offset)?
-        {
+        let start = usize::try_from(offset).unwrap_or(usize::MAX);
+        if let Some(here) = self.head.get(start..).filter(|here| !here.is_empty()) {
+            let done = wanted.min(here.len());
+            buffer[..done].copy_from_slice(&here[..done]);
             return Ok(done);
         }
+        let ahead = self.ahead.read().unwrap_or_else(PoisonError::into_inner);
+        let absent = match &*ahead {
+            Some(ahead) => match ahead.read(buffer, offset)? {
+                Got::Copied(done) => return Ok(done),
+                Got::Absent(part) => part,
+            },
+            None => wanted,
+        };
         drop(ahead);
-        let bytes = self.file.fetch(offset..end)?;
-        buffer.copy_from_slice(&bytes);
-        Ok(wanted)
+        self.file.fill(&mut buffer[..absent], offset)?;
+        Ok(absent)
     }
 }
 
@@ -173,6 +181,12 @@ impl Remote {
     fn once(&self, range: Range<u64>) -> io::Result<Bytes> {
         let got = self.ask(Some(range.clone()))?;
         Answer::of(got).take(range.end - range.start)
+    }
+
+    /// Fills `buffer` from `offset`, as [`Self::fetch`], without memory for a copy.
+    fn fill(&self, buffer: &mut [u8], offset: u64) -> io::Result<()> {
+        let range = offset..offset + buffer.len() as u64;
+        again(|| Answer::of(self.ask(Some(range.clone()))?).fill(buffer))
     }
 
     /// All bytes, as they arrive.

@@ -6,16 +6,20 @@ use super::location::Location;
 use super::stores::{Door, Patience};
 use super::upload::{Bucket, Store};
 use super::wait::wait;
-use http::{Method, Request};
+use http::{Method, Request, StatusCode};
 use object_store::client::{HttpConnector, HttpRequestBody};
 use object_store::path::Path;
 use object_store::signer::{SignedUrlOptions, Signer};
 use std::io::{self, ErrorKind};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use url::Url;
 
 /// How long a signed request is good: it is made at once.
 const SOON: Duration = Duration::from_secs(60);
+
+/// How long a list that fails is asked for again, and the pause between.
+const AGAIN: Duration = Duration::from_secs(8);
+const PAUSE: Duration = Duration::from_millis(500);
 
 /// Most bytes of a list: it has at most 1000 uploads.
 const LONGEST: usize = 4 << 20;
@@ -25,7 +29,8 @@ impl Bucket {
     /// that belong to no file go by themselves after a week.
     ///
     /// # Errors
-    /// [`ErrorKind::Unsupported`] if the store does not tell them.
+    /// [`ErrorKind::Unsupported`] if the store does not tell them, [`ErrorKind::PermissionDenied`] if it does not tell
+    /// us; what ends a request.
     pub fn unfinished(&self, of: &Location) -> io::Result<Vec<String>> {
         let path = of.path().map_err(told)?;
         let query = [("uploads", ""), ("prefix", path.as_ref())];
@@ -48,29 +53,57 @@ impl Bucket {
         Ok(uploads_of(&text, path.as_ref()))
     }
 
-    /// The answer to a request with this token.
+    /// The answer to a request with this token. A failure that may pass is tried again, for seconds.
     fn get(&self, url: &Url, token: Option<String>) -> io::Result<String> {
+        let token = token.filter(|token| !token.is_empty());
+        let begun = Instant::now();
+        loop {
+            match self.once(url, token.as_deref()) {
+                Err(e) if e.kind() == ErrorKind::Other && begun.elapsed() < AGAIN => {
+                    std::thread::sleep(PAUSE);
+                }
+                done => return done,
+            }
+        }
+    }
+
+    fn once(&self, url: &Url, token: Option<&str>) -> io::Result<String> {
         // The URL has a signature in it, so that no error tells it.
-        let failed = |why: &str| {
+        let failed = |kind: ErrorKind, why: &str| {
             let why = format!("the list of unfinished uploads: {why}");
-            io::Error::new(ErrorKind::Unsupported, why)
+            io::Error::new(kind, why)
         };
         let client = Door::new(Patience::Short, &self.counts)
             .client(url.as_str(), false)
             .connect(&Default::default());
         let mut request = Request::get(url.as_str());
-        if let Some(token) = token.filter(|token| !token.is_empty()) {
+        if let Some(token) = token {
             request = request.header("authorization", format!("Bearer {token}"));
         }
         let request = request.body(HttpRequestBody::empty());
-        let request = request.map_err(|_| failed("no request"))?;
+        let request = request.map_err(|_| failed(ErrorKind::Unsupported, "no request"))?;
         let answer = wait(client.map_err(told)?.execute(request))?;
-        let answer = answer.map_err(|_| failed("no answer"))?;
-        if !answer.status().is_success() {
-            return Err(failed(&answer.status().to_string()));
+        let answer = answer.map_err(|_| failed(ErrorKind::Other, "no answer"))?;
+        let status = answer.status();
+        if !status.is_success() {
+            return Err(failed(kind_of(status), &status.to_string()));
         }
         let body = Answer::of_body(answer.into_body()).all(LONGEST as u64)?;
-        String::from_utf8(body.into()).map_err(|_| failed("it is no text"))
+        let none = |_| failed(ErrorKind::Unsupported, "it is no text");
+        String::from_utf8(body.into()).map_err(none)
+    }
+}
+
+/// What a status means for a list that was asked for.
+fn kind_of(status: StatusCode) -> ErrorKind {
+    match status {
+        StatusCode::UNAUTHORIZED | StatusCode::FORBIDDEN => ErrorKind::PermissionDenied,
+        // The store is busy, or out of order.
+        StatusCode::REQUEST_TIMEOUT | StatusCode::TOO_MANY_REQUESTS => ErrorKind::Other,
+        status if status.is_server_error() && status != StatusCode::NOT_IMPLEMENTED => {
+            ErrorKind::Other
+        }
+        _ => ErrorKind::Unsupported,
     }
 }
 
@@ -116,5 +149,20 @@ mod tests {
         assert_eq!(uploads_of(&list, "a & b.ply"), ["one", "three<"]);
         assert!(uploads_of("<Upload><Key>a", "a").is_empty());
         assert!(uploads_of("", "").is_empty());
+    }
+
+    #[test]
+    fn only_a_store_that_does_not_tell_its_uploads_has_no_list() {
+        for (status, kind) in [
+            (400, ErrorKind::Unsupported),
+            (403, ErrorKind::PermissionDenied),
+            (405, ErrorKind::Unsupported),
+            (429, ErrorKind::Other),
+            (500, ErrorKind::Other),
+            (501, ErrorKind::Unsupported),
+            (503, ErrorKind::Other),
+        ] {
+            assert_eq!(kind_of(StatusCode::from_u16(status).unwrap()), kind);
+        }
     }
 }

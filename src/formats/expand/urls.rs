@@ -20,16 +20,12 @@ const HEAD: u64 = 16 << 10;
 /// The scans below a prefix of a store, with their sizes; none if the path names one file. Files are told by their
 /// names: to look into each would be a request for each.
 pub(super) fn below(prefix: &Path) -> Result<Option<Vec<(PathBuf, u64)>>> {
-    let Some(mut files) = files_below(prefix)? else {
-        return Ok(None);
-    };
     let hidden = |path: &Path| {
         let name = path.file_name().unwrap_or_default();
         name.as_encoded_bytes().starts_with(b".")
     };
     let named = |path: &Path| FORMATS.iter().any(|f| has_extension(path, f.extensions()));
-    files.retain(|(path, _)| named(path) && !hidden(path));
-    Ok(Some(files))
+    files_below(prefix, |path| named(path) && !hidden(path))
 }
 
 /// The inputs in a local list, one on each line; none for a file that is no list. Empty lines and lines that begin

@@ -5,16 +5,16 @@ use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::compressed::Content;
 use outcrop_disk::workspace::memory::Reservation;
 use outcrop_disk::workspace::{Workspace, lock};
-use outcrop_remote::{Counts, Location, Object, Whole};
+use outcrop_remote::{Counts, Location, Object, Room, Whole};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 
-/// Most files below a prefix: the names of so many take some hundred megabytes.
+/// Most files below a prefix. Their names are reserved with those of all inputs.
 const MOST: usize = 1 << 20;
 
-/// Most memory for parts that are fetched before they are read, and its share of what is free. Half of it keeps
-/// eight requests of 2 MiB under way.
+/// Most memory for parts that are fetched before they are read, and its share of what is free: it keeps eight requests
+/// of 4 MiB under way.
 const AHEAD: u64 = 32 << 20;
 const SHARE: u64 = 8;
 
@@ -70,9 +70,9 @@ impl Remote {
     ) -> Result<()> {
         let mut held = lock(&self.held);
         *held = None;
-        let memory = memory_ahead(workspace);
-        *held = Some(workspace.reserve("fetched ahead", memory)?);
-        self.object.expect(ranges, memory);
+        let room = room(workspace);
+        *held = Some(workspace.reserve("fetched ahead", room.bytes)?);
+        self.object.expect(ranges, room);
         Ok(())
     }
 
@@ -141,10 +141,10 @@ impl Beside {
         begun: Option<i64>,
         workspace: &Workspace,
     ) -> Result<Expected> {
-        let memory = memory_ahead(workspace);
+        let room = room(workspace);
         Ok(Expected {
-            _held: workspace.reserve("fetched ahead", memory)?,
-            files: self.0.expect(files, memory, begun),
+            _held: workspace.reserve("fetched ahead", room.bytes)?,
+            files: self.0.expect(files, room, begun),
         })
     }
 }
@@ -162,12 +162,12 @@ impl Expected {
     }
 }
 
-/// Memory for what is fetched before it is read: none where tasks share the files, each of which reads parts that are
-/// not known before.
-fn memory_ahead(workspace: &Workspace) -> u64 {
-    match workspace.is_shared() {
-        true => 0,
-        false => AHEAD.min(workspace.memory.available() / SHARE),
+/// Memory for what is fetched. Nothing is fetched before it is read where tasks share the files: each reads parts that
+/// are not known before.
+fn room(workspace: &Workspace) -> Room {
+    Room {
+        bytes: AHEAD.min(workspace.memory.available() / SHARE),
+        is_ahead: !workspace.is_shared(),
     }
 }
 
@@ -179,8 +179,11 @@ fn location(path: &Path) -> Result<Location> {
     })
 }
 
-/// The files below a prefix, with their sizes; none if the path names one file.
-pub(in super::super) fn below(path: &Path) -> Result<Option<Vec<(PathBuf, u64)>>> {
+/// The files below a prefix that are `wanted`, with their sizes; none if the path names one file.
+pub(in super::super) fn below(
+    path: &Path,
+    wanted: impl Fn(&Path) -> bool,
+) -> Result<Option<Vec<(PathBuf, u64)>>> {
     let prefix = location(path)?;
     if !prefix.is_prefix() {
         return Ok(None);
@@ -190,10 +193,9 @@ pub(in super::super) fn below(path: &Path) -> Result<Option<Vec<(PathBuf, u64)>>
         let expected = "URLs of files, or a file with a list of them";
         return Err(Error::input(path, "URL", found, expected));
     }
-    let listed = outcrop_remote::list(&prefix, MOST, &Arc::<Counts>::default())
+    let wanted = |url: &str| wanted(Path::new(url));
+    let listed = outcrop_remote::list(&prefix, MOST, wanted, &Arc::<Counts>::default())
         .map_err(|e| Error::io(path, "list", e))?;
-    let files = listed
-        .into_iter()
-        .map(|file| (file.location.to_string().into(), file.bytes));
+    let files = listed.into_iter().map(|file| (file.url.into(), file.bytes));
     Ok(Some(files.collect()))
 }

@@ -84,7 +84,10 @@ impl Expected {
     }
 }
 
-pub(in super::super) fn below(path: &Path) -> Result<Option<Vec<(PathBuf, u64)>>> {
+pub(in super::super) fn below(
+    path: &Path,
+    _: impl Fn(&Path) -> bool,
+) -> Result<Option<Vec<(PathBuf, u64)>>> {
     Err(refused(path))
 }
 
