@@ -13,6 +13,7 @@ mod disk;
 mod levels;
 mod like;
 mod made;
+mod identity;
 mod manifest;
 mod mesh_job;
 mod origin;

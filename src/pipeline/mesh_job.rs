@@ -1,16 +1,17 @@
 //! A run on finished meshes or on clouds, which can be resumed: its manifest and its scratch folder.
 
+#[cfg(all(test, feature = "cloud"))]
+mod tests;
+
+use super::identity::{Identity, difference, identities};
 use super::resources::Resources;
 use super::{Start, start::scratch_folder};
 use crate::deliver::Delivery;
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::memory::MemoryPool;
 use outcrop_disk::workspace::{Folder, Found, Workspace, fault};
-use outcrop_formats::expand;
-use outcrop_platform::{FileAt, modified};
 use outcrop_points::is_remote;
 use serde::{Deserialize, Serialize};
-use std::fs::File;
 use std::path::{Path, PathBuf};
 
 /// A run that makes something of meshes or clouds.
@@ -34,56 +35,7 @@ struct Manifest<O> {
     inputs: Vec<PathBuf>,
     output: PathBuf,
     options: O,
-    seen: Seen,
-}
-
-/// Size in bytes, time of change and checksum of the inputs: a resumed run notices other files of the same names.
-#[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
-struct Seen {
-    bytes: u64,
-    /// The latest change.
-    modified: (i64, i64),
-    sample: u32,
-}
-
-/// Bytes at each end of a file by which another content is noticed.
-const SAMPLE: u64 = 1 << 16;
-
-impl Seen {
-    /// Looks at the inputs, and at the clouds in those that are folders.
-    fn of(inputs: &[PathBuf]) -> Result<Self> {
-        let (mut seen, mut crc) = (Self::default(), crc32fast::Hasher::new());
-        for input in inputs {
-            let files = match !is_remote(input) && input.is_dir() {
-                true => expand(std::slice::from_ref(input))?,
-                false => vec![input.clone()],
-            };
-            for path in &files {
-                if is_remote(path) {
-                    // Each attempt reads one version of it, or no more than what an earlier one read.
-                    crc.update(path.as_os_str().as_encoded_bytes());
-                    continue;
-                }
-                let read = seen.look(path, &mut crc);
-                read.map_err(|e| Error::io(path, "read", e))?;
-            }
-        }
-        seen.sample = crc.finalize();
-        Ok(seen)
-    }
-
-    fn look(&mut self, path: &Path, crc: &mut crc32fast::Hasher) -> std::io::Result<()> {
-        let file = File::open(path)?;
-        let about = file.metadata()?;
-        for at in [0, about.len().saturating_sub(SAMPLE)] {
-            let mut bytes = vec![0; (about.len() - at).min(SAMPLE) as usize];
-            file.read_exact_at(&mut bytes, at)?;
-            crc.update(&bytes);
-        }
-        self.bytes += about.len();
-        self.modified = self.modified.max(modified(&about));
-        Ok(())
-    }
+    files: Vec<Identity>,
 }
 
 impl<O: Clone + Serialize> Manifest<O> {
@@ -106,7 +58,7 @@ impl<O: Clone + Serialize> Manifest<O> {
                 .collect(),
             output: url.unwrap_or_else(|| whole(job.output)),
             options: job.options.clone(),
-            seen: Seen::of(job.inputs)?,
+            files: identities(job.inputs)?,
         })
     }
 
@@ -119,17 +71,27 @@ impl<O: Clone + Serialize> Manifest<O> {
     fn check(&self, bytes: &[u8], folder: &Path) -> Result<()> {
         let was: serde_json::Value = serde_json::from_slice(bytes).unwrap_or_default();
         let now = serde_json::to_value(self).unwrap_or_default();
-        let differing = now
-            .as_object()
-            .and_then(|now| now.iter().find(|(key, value)| was.get(key) != Some(value)));
-        match differing {
-            None => Ok(()),
-            Some((key, value)) => Err(Error::Mismatch {
+        let differ = |what: String, was: String, now: String| {
+            Err(Error::Mismatch {
                 path: folder.to_path_buf(),
-                what: format!("the {key}"),
-                was: was[key].to_string(),
-                now: value.to_string(),
-            }),
+                what,
+                was,
+                now,
+            })
+        };
+        let mut entries = now.as_object().into_iter().flatten();
+        let other = entries.find(|(key, value)| *key != "files" && was.get(key) != Some(value));
+        if let Some((key, value)) = other {
+            return differ(
+                format!("the {key}"),
+                was[key].to_string(),
+                value.to_string(),
+            );
+        }
+        let files: Vec<Identity> = Vec::deserialize(&was["files"]).unwrap_or_default();
+        match difference(&files, &self.files) {
+            None => Ok(()),
+            Some((what, was, now)) => differ(what, was, now),
         }
     }
 }
