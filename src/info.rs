@@ -6,7 +6,7 @@ mod headers;
 mod text;
 
 use crate::params::Params;
-use crate::pipeline::{Files, Known};
+use crate::pipeline::{Files, Known, unestimated};
 #[cfg(feature = "pages")]
 pub use drawing::{Illustration, illustrated};
 pub use headers::{Headers, headers};
@@ -141,6 +141,9 @@ fn described(
     observer.end();
     let input = spool.stats().clone();
     input.warnings.iter().for_each(|w| observer.warn(w));
+    let unestimated = headers.as_ref().err().map(unestimated);
+    unestimated.iter().for_each(|w| observer.warn(w));
+    let headers = headers.ok();
     let lattice = spool.choose_lattice(0)?;
     if let Some(sketch) = &mut sketch {
         sketch.count(&spool, &lattice, workspace)?;

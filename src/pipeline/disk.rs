@@ -133,14 +133,22 @@ impl Text {
 /// Decimals assumed as long as they are unknown.
 const DECIMALS: usize = 3;
 
+/// The warning of a run whose inputs were readable, but not all of their headers.
+pub(crate) fn unestimated(error: &Error) -> String {
+    format!("disk space was not estimated from headers: {error}")
+}
+
 impl Known {
     /// The properties in the headers of the inputs. They may be wrong, but cannot exceed the sizes of the
     /// files.
-    pub fn from_headers(inputs: &[PathBuf], selection: &Selection) -> Option<Self> {
+    ///
+    /// # Errors
+    /// Those of a header that cannot be read. Points may be readable nevertheless.
+    pub fn from_headers(inputs: &[PathBuf], selection: &Selection) -> Result<Self> {
         let mut known = Self::default();
         let mut probes = Vec::new();
-        for path in outcrop_formats::expand(inputs).ok()? {
-            let probe = outcrop_formats::probe_as(&path, &selection.layout).ok()?;
+        for path in outcrop_formats::expand(inputs)? {
+            let probe = outcrop_formats::probe_as(&path, &selection.layout)?;
             let points = probe.points_likely;
             known.read += points;
             let values = probe.value_bytes(&selection.attributes);
@@ -157,7 +165,7 @@ impl Known {
         known.points = known.read;
         known.values += made(&selection.attributes);
         known.double = double(&probes);
-        Some(known)
+        Ok(known)
     }
 
     /// Checks that the mesh of the points will not exceed a limit of the format of `output`. Refused is what

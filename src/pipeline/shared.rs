@@ -107,7 +107,8 @@ impl Reconstruction {
         writable(&self.mesh)?;
         not_an_input(&self.mesh, self.params.split.is_some(), &self.inputs)?;
         one_system(&self.params, &self.inputs)?;
-        let headers = Known::from_headers(&self.inputs, &self.params.selection());
+        // Who begins the first generation tells of a header that cannot be read.
+        let headers = Known::from_headers(&self.inputs, &self.params.selection()).ok();
         if let Some(known) = headers.filter(|_| all_are_kept(&self.params)) {
             // Its output cannot be changed later.
             known.fits(&self.params, &self.mesh, 1.0)?;
