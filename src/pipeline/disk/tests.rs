@@ -98,11 +98,8 @@ fn a_header_cannot_claim_more_than_its_file_holds() {
     let header = "ply\nformat binary_little_endian 1.0\nelement vertex 1000000000000\n\
         property float x\nproperty float y\nproperty float z\nend_header\n";
     std::fs::write(&path, [header.as_bytes(), &[0; 1200]].concat()).unwrap();
-    let known = Known::from_headers(&[path], &Selection::default());
-    assert!(
-        known.as_ref().is_ok_and(|known| known.points < 200),
-        "{known:?}"
-    );
+    let known = Known::from_headers(&[path], &Selection::default()).ok();
+    assert!(known.is_none_or(|known| known.points < 200), "{known:?}");
     let nothing = Known::from_headers(&[folder.path().join("nothing")], &Selection::default());
     let said = unestimated(&nothing.unwrap_err());
     assert!(said.contains("nothing: cannot open"), "{said}");
