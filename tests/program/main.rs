@@ -9,6 +9,7 @@ mod levels;
 mod raster;
 mod resume;
 mod shared;
+mod skip;
 mod verify;
 mod view;
 mod volume;

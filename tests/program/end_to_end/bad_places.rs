@@ -129,7 +129,8 @@ fn a_scratch_folder_that_is_too_small() {
     };
     let probe = run(&mount("1m"), &[]);
     if probe.code != Some(0) {
-        println!("skipped: no private mounts here: {}", probe.err.trim());
+        let why = probe.err.trim();
+        util::skip(format_args!("no private mounts here: {why}"));
         return;
     }
     let program = Path::new(env!("CARGO_BIN_EXE_outcrop"));

@@ -14,7 +14,7 @@ fn commit() -> Option<String> {
     let said = git.ok().filter(|said| said.status.success());
     let is_here = root.join(".git").exists() && std::env::var_os("OUTCROP_COMMIT").is_none();
     let Some(said) = said.filter(|_| is_here) else {
-        println!("skipped: the sources are in no repository of their own, or there is no git");
+        util::skip("the sources are in no repository of their own, or there is no git");
         return None;
     };
     Some(String::from_utf8(said.stdout).unwrap().trim().to_owned())

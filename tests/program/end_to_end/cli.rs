@@ -200,7 +200,7 @@ fn progress_is_shown_on_a_terminal_unless_quiet() {
         command.output().map(Said::from)
     };
     let Ok(said) = on_a_terminal("") else {
-        println!("skipped: no `script` to make a terminal");
+        util::skip("no `script` to make a terminal");
         return;
     };
     assert_eq!(said.code, Some(0), "{said:?}");

@@ -46,7 +46,7 @@ fn takes(shell: &str, script: &Path) -> Option<bool> {
     match checked.arg("-n").arg(script).output() {
         Ok(output) => Some(output.status.success() && output.stderr.is_empty()),
         Err(_) => {
-            println!("skipped: there is no {shell}");
+            util::skip(format_args!("there is no {shell}"));
             None
         }
     }

@@ -1,6 +1,7 @@
 //! Shared by the end-to-end tests: generated clouds, runs of the library and of the program, and their
 //! results.
 
+
 use outcrop::inspect::verify::{Verdict, verify};
 use outcrop::params::Params;
 use outcrop::report::Report;
@@ -15,17 +16,14 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::sync::Arc;
 
+pub use crate::skip::skip;
+
 /// Folder of real scans, if it exists.
 pub const SCANS: &str = "../shared/data/scans";
 
-/// The real scan `name`; none, with a message, if it is absent.
+/// The real scan `name`; if it is absent, the test is skipped.
 pub fn scan(name: &str) -> Option<PathBuf> {
-    let path = Path::new(SCANS).join(name);
-    if !path.exists() {
-        println!("skipped: {} is absent", path.display());
-        return None;
-    }
-    Some(path)
+    crate::skip::if_present(Path::new(SCANS).join(name))
 }
 
 /// A folder for the files of one test.

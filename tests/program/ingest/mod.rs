@@ -1,5 +1,6 @@
 //! Generated files of every kind, read back as lattice positions.
 
+
 mod belong;
 mod bench;
 mod bombs;
@@ -168,11 +169,9 @@ fn folders_are_searched_by_content() {
 #[test]
 #[ignore = "takes long without optimisation"]
 fn reads_a_large_scan() {
-    let path = PathBuf::from("../shared/data/scans/autzen.laz");
-    if !path.exists() {
-        println!("skipped: {} is absent", path.display());
+    let Some(path) = crate::skip::if_present("../shared/data/scans/autzen.laz") else {
         return;
-    }
+    };
     let bench = Bench::new();
     let start = std::time::Instant::now();
     let spool = bench.read(&[path]).unwrap();

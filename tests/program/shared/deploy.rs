@@ -115,10 +115,8 @@ fn google_batch_with_a_bucket() {
 fn drives(tasks: &str, programs: &[(&str, &str)]) {
     let python = Command::new("python3").arg("--version").output();
     if !programs.is_empty() && python.is_err() {
-        println!(
-            "skipped: there is no python3 to stand for {}",
-            programs[0].0
-        );
+        let name = programs[0].0;
+        util::skip(format_args!("there is no python3 to stand for {name}"));
         return;
     }
     let case = Case::new(&[]);

@@ -1,5 +1,8 @@
 //! The program from a scan to a row of the table.
 
+#[path = "../../../tests/program/skip.rs"]
+mod skip;
+
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -151,11 +154,9 @@ fn real_scans_of_other_formats() {
     let folder = tempfile::tempdir().unwrap();
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/scans");
     for (name, points) in SCANS {
-        let scan = root.join(name);
-        if !scan.exists() {
-            println!("skipped: {} is absent", scan.display());
+        let Some(scan) = skip::if_present(root.join(name)) else {
             continue;
-        }
+        };
         let scan = scan.to_str().unwrap();
         let arguments = [&["split", scan], &SPLIT[2..]].concat();
         let text = said(&arguments, folder.path());

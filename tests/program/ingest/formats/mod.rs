@@ -13,6 +13,7 @@ mod text;
 mod zoo;
 
 use crate::ingest::bench::Bench;
+use crate::skip::if_present;
 use kinds::{KINDS, Kind};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -97,11 +98,9 @@ fn the_page_says_what_becomes_of_every_kind_of_file() {
 /// Files of other programs, if their folder exists, have the outcomes of their rows.
 #[test]
 fn files_of_other_programs_are_as_the_page_says() {
-    let zoo = PathBuf::from("../shared/data/zoo");
-    if !zoo.is_dir() {
-        println!("skipped: {} is absent", zoo.display());
+    let Some(zoo) = if_present("../shared/data/zoo") else {
         return;
-    }
+    };
     let rows = rows();
     let bench = Bench::new();
     let mut wrong = Vec::new();
