@@ -1,6 +1,7 @@
 //! The driver: the stages in the order of the data flow.
 
 mod attempt;
+mod away;
 mod beside;
 mod builder;
 mod change;
@@ -10,6 +11,7 @@ mod clock;
 mod close;
 pub mod compare;
 mod disk;
+mod hidden;
 mod identity;
 mod levels;
 mod like;
@@ -32,6 +34,7 @@ use crate::deliver::Delivery;
 use crate::params::Params;
 use crate::report::Report;
 use attempt::Alarm;
+pub(crate) use away::Copies;
 pub use builder::Builder;
 pub use change::ChangeDetection;
 use checks::{not_an_input, one_system, writable};
@@ -45,10 +48,10 @@ use outcrop_disk::workspace::progress::{Cancel, Observer};
 use outcrop_disk::workspace::{Folder, Storage, Workspace, limits};
 pub use raster::Rasterization;
 pub(crate) use resources::temporary;
+pub(crate) use shared::planned_shards;
 pub use shared::{
     Advanced, Begun, Status, TaskState, Totals, Worked, part_of, shared_folder, status,
 };
-pub(crate) use shared::{Copies, planned_shards};
 #[cfg(feature = "levels")]
 pub use simplify::Simplification;
 use stages::Stages;
@@ -87,7 +90,7 @@ pub struct Reconstruction {
     start: Start,
     time_limit: Option<Duration>,
     pictures: bool,
-    copies: shared::Copies,
+    copies: Copies,
 }
 
 /// Half of the memory that machine and cgroup allow.

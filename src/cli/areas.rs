@@ -1,6 +1,6 @@
 //! Areas of change as a table, or as polygons for a map: one box around each, in the coordinates of the files.
 
-use super::output::NewFile;
+use super::new_file::NewFile;
 use outcrop_disk::error::{Error, Result};
 use outcrop_inspect::change::{Area, Change};
 use serde_json::{Value, json};

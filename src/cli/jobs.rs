@@ -4,7 +4,8 @@ use super::args::{
     Change, Close, Compare, Ends, Info, Limits, Raster, Reconstruct, Resume, Simplify,
     Tiles as TilesArgs, Verify, Volume,
 };
-use super::output::{NewFile, is_page, report_text};
+use super::new_file::{NewFile, is_page};
+use super::output::report_text;
 use super::{areas, pages};
 #[cfg(not(feature = "levels"))]
 use crate::features::LEVELS;

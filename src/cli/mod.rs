@@ -10,6 +10,7 @@ mod demo;
 mod ended;
 mod jobs;
 mod manual;
+mod new_file;
 mod output;
 mod pages;
 mod parse;

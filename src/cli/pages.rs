@@ -7,7 +7,7 @@ pub use made::{change, compare, info, report, verify};
 
 #[cfg(feature = "pages")]
 mod made {
-    use super::super::output::NewFile;
+    use super::super::new_file::NewFile;
     use crate::params::Params;
     use crate::pipeline::{ChangeDetection, compare};
     use crate::report::Report;
@@ -66,7 +66,7 @@ mod made {
 
 #[cfg(not(feature = "pages"))]
 mod absent {
-    use super::super::output::NewFile;
+    use super::super::new_file::NewFile;
     use crate::features::PAGES;
     use crate::info::Info;
     use crate::params::Params;

@@ -1,5 +1,6 @@
 //! Streaming reader of triangle meshes in PLY files; see [`MeshStream`].
 
+use crate::failure::{Failure, converted};
 use crate::foreign::{as_plain_ply, as_ply, is_foreign};
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::Workspace;
@@ -303,32 +304,6 @@ impl<S: Sink, P: Fn([f64; 3]) -> [f64; 3]> Sink for InPlace<'_, S, P> {
     fn triangles(&mut self, triangles: &[[u32; 3]]) -> Result<()> {
         self.sink.triangles(triangles)
     }
-}
-
-/// An error as the reader returns it: its own, or that of a sink.
-pub(crate) struct Failure(Error);
-
-impl From<Error> for Failure {
-    fn from(error: Error) -> Self {
-        Self(error)
-    }
-}
-
-impl From<FileError> for Failure {
-    fn from(error: FileError) -> Self {
-        Self(match error {
-            FileError::Io {
-                path,
-                action,
-                source,
-            } => Error::io(path, action, source),
-            FileError::Content { path, source } => Error::ply(&path, source),
-        })
-    }
-}
-
-pub(crate) fn converted(error: impl Into<Failure>) -> Error {
-    error.into().0
 }
 
 #[cfg(test)]

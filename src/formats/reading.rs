@@ -83,7 +83,8 @@ pub(super) fn read_all(
         let found = opened.file.found();
         let columns = wanted.found(&found);
         present.extend(found);
-        taken.add(&opened);
+        let path = &opened.input.path;
+        taken.add(path, opened.claims.format, opened.file.taken());
         let read = target.stats();
         let (next, more, more_values) = target.end();
         section = next;

@@ -1,9 +1,9 @@
 //! What was read of text files whose columns are not plainly named, for the user.
 
-use super::Opened;
 use outcrop_disk::error::{Error, Result};
 use outcrop_points::Format;
 use outcrop_points::Layout;
+use std::path::Path;
 
 /// The columns taken of all text files.
 #[derive(Default)]
@@ -15,15 +15,16 @@ pub(super) struct Taken {
 }
 
 impl Taken {
-    pub(super) fn add(&mut self, opened: &Opened) {
-        self.texts |= opened.claims.format == Format::TEXT;
-        let Some((taken, true)) = opened.file.taken() else {
+    /// Adds a file, and what was taken of it; true with that if the file does not say it plainly.
+    pub(super) fn add(&mut self, path: &Path, format: Format, taken: Option<(&str, bool)>) {
+        self.texts |= format == Format::TEXT;
+        let Some((taken, true)) = taken else {
             return;
         };
         match self.guessed.iter_mut().find(|(known, ..)| known == taken) {
             Some((.., more)) => *more += 1,
             None => {
-                let path = opened.input.path.display().to_string();
+                let path = path.display().to_string();
                 self.guessed.push((taken.to_owned(), path, 0));
             }
         }

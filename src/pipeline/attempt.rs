@@ -1,8 +1,8 @@
 //! One attempt at a run: its beginning, its time limit, and the removal of its scratch files.
 
-use super::builder::open_of;
+use super::away::is_store;
+use super::hidden::open_of;
 use super::manifest::Manifest;
-use super::shared::is_store;
 use super::{Reconstruction, Start, beside, levels};
 use crossbeam_channel::{RecvTimeoutError, Sender, bounded};
 use outcrop_disk::error::{Error, Result};

@@ -1,8 +1,9 @@
 //! The builder of a reconstruction, with all checks before it begins.
 
+use super::away::Copies;
+use super::hidden::mesh_of;
 use super::manifest::Manifest;
 use super::resources::{Resources, resource_setters};
-use super::shared::Copies;
 use super::start::{Start, scratch_folder};
 use super::{Reconstruction, levels, made};
 use crate::deliver::{Delivery, Kind};
@@ -35,6 +36,17 @@ pub struct Builder {
 }
 
 impl Builder {
+    /// With the settings of a run.
+    pub(super) fn of(manifest: &Manifest) -> Self {
+        manifest
+            .inputs()
+            .fold(Self::default(), Self::input)
+            .output(manifest.output())
+            .params(manifest.params())
+            .tile_points(manifest.tile_points)
+            .page_points(manifest.page_points)
+    }
+
     /// Adds a file or folder of points; all inputs together are one cloud.
     #[must_use]
     pub fn input(mut self, path: impl Into<PathBuf>) -> Self {
@@ -174,24 +186,6 @@ impl Builder {
     }
 }
 
-/// The mesh from which a tileset, a smaller mesh or a closed one is made.
-fn mesh_of(target: &Path) -> PathBuf {
-    hidden(target, "mesh")
-}
-
-/// The smaller mesh that is not closed yet.
-pub(super) fn open_of(target: &Path) -> PathBuf {
-    hidden(target, "open")
-}
-
-/// A hidden mesh beside a file or folder.
-fn hidden(target: &Path, what: &str) -> PathBuf {
-    let mut name = std::ffi::OsString::from(".");
-    name.push(target.file_name().unwrap_or_default());
-    name.push(format!(".outcrop-{what}.ply"));
-    target.with_file_name(name)
-}
-
 /// The builder of the unfinished run that was found in a scratch folder.
 ///
 /// # Errors
@@ -207,8 +201,7 @@ pub(super) fn unfinished(folder: &Path, found: Found) -> Result<Builder> {
         }
     };
     let manifest = Manifest::from_bytes(folder, &found.manifest)?;
-    Ok(manifest
-        .settings()
+    Ok(Builder::of(&manifest)
         .start(Start::Resume)
         .folder(folder.to_path_buf()))
 }

@@ -1,8 +1,8 @@
 //! The manifest: parameters, output and the identity of every input of a run. It ensures that a run is
 //! resumed only with the same ones.
 
+use super::Reconstruction;
 use super::identity::{Identity, Name, difference, identities};
-use super::{Builder, Reconstruction};
 use crate::params::Params;
 use outcrop_disk::error::{Error, Result};
 use outcrop_mesh::surface::evidence::Division;
@@ -21,8 +21,8 @@ pub(super) struct Manifest {
     params: Params,
     block: u32,
     division: Division,
-    tile_points: u32,
-    page_points: usize,
+    pub tile_points: u32,
+    pub page_points: usize,
     /// Inputs as given.
     inputs: Vec<Name>,
     files: Vec<Identity>,
@@ -72,20 +72,18 @@ impl Manifest {
         serde_json::from_value(value).map_err(|e| not(format!("its manifest cannot be read: {e}")))
     }
 
-    /// The settings of the run.
-    pub fn settings(self) -> Builder {
-        let params = Params {
+    /// The parameters of the run.
+    pub fn params(&self) -> Params {
+        Params {
             block: self.block,
             division: self.division,
-            ..self.params
-        };
-        let inputs = self.inputs.iter().map(Name::path);
-        inputs
-            .fold(Reconstruction::builder(), Builder::input)
-            .output(self.output.path())
-            .params(params)
-            .tile_points(self.tile_points)
-            .page_points(self.page_points)
+            ..self.params.clone()
+        }
+    }
+
+    /// The inputs, as they were given.
+    pub fn inputs(&self) -> impl Iterator<Item = PathBuf> {
+        self.inputs.iter().map(Name::path)
     }
 
     /// Takes the output of `now`, if that is another one. Nothing but the export depends on it.

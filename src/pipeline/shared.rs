@@ -1,6 +1,7 @@
 //! A run that tasks share, perhaps on several machines: its plan, the work of a task, and the work between
 //! two generations of tasks. [`outcrop_disk::workspace::generations`] has the files.
 
+use super::away::Copies;
 use super::checks::{all_are_kept, not_an_input, one_system, writable};
 use super::manifest::Manifest;
 use super::{Builder, Known, Reconstruction, Start, made};
@@ -21,8 +22,6 @@ mod program;
 mod status;
 
 pub use find::shared_folder;
-pub(crate) use place::Copies;
-pub(super) use place::{below, is_store};
 pub use program::part_of;
 use program::program;
 pub use status::{Begun, Status, TaskState, Totals, status};
@@ -153,10 +152,10 @@ impl Reconstruction {
         let manifest = Manifest::from_bytes(&path, &folder.manifest)?;
         if folder.is_left_over() {
             // There is nothing to do but to remove it.
-            return Ok(manifest.settings().folder(path).threads(1));
+            return Ok(Builder::of(&manifest).folder(path).threads(1));
         }
         let plan = folder.sharing()?;
-        let builder = manifest.settings().folder(path).with_copies(copies);
+        let builder = Builder::of(&manifest).folder(path).with_copies(copies);
         Ok(builder.threads(plan.threads as usize).memory(plan.memory))
     }
 

@@ -1,6 +1,6 @@
 //! A run that makes a mesh with fewer triangles, and that can be resumed.
 
-use super::builder::open_of;
+use super::hidden::open_of;
 use super::close::{check_output, closed};
 use super::compare;
 use super::like::Like;

@@ -1,6 +1,6 @@
 //! The place of scratch files, and the treatment of an unfinished run.
 
-use super::shared::{below, is_store};
+use super::away::{below, is_store};
 use crate::deliver::{SCRATCH, scratch_name, scratch_of};
 use outcrop_mesh_files::export;
 use std::path::{Path, PathBuf};

@@ -124,7 +124,7 @@ pub fn sync_below(folder: &Path) -> io::Result<()> {
             false => File::options().write(true).open(entry.path())?.sync_all()?,
         }
     }
-    crate::sync_folder(folder)
+    sync_names(&open_folder(folder)?)
 }
 
 /// Ticks of a ten-millionth of a second between the beginnings of 1601, from which the system counts, and of 1970.

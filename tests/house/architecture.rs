@@ -1,6 +1,10 @@
 //! The map of ARCHITECTURE.md, checked by the paths in `src`: the permitted imports of each room inside a crate (the
 //! manifests hold those between crates), no circle of imports, rows with named fields, and files of limited length.
 
+mod imports;
+mod skips;
+
+use crate::source::graph::Graph;
 use crate::source::{modules, modules_of};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -78,95 +82,11 @@ const MAY_USE: &[(&str, &str)] = &[
 /// Largest number of lines of a file, without its tests.
 const MOST_LINES: usize = 500;
 
-/// `a::{b, c::{d, e}}` as `a::b`, `a::c::d`, `a::c::e`.
-fn expand(path: &str) -> Vec<String> {
-    let Some((before, inside)) = path.split_once('{') else {
-        return vec![path.split(" as ").next().unwrap().trim().to_owned()];
-    };
-    let inside = inside.trim_end().strip_suffix('}').unwrap();
-    let (mut parts, mut depth) = (vec![String::new()], 0);
-    for c in inside.chars() {
-        depth += i32::from(c == '{') - i32::from(c == '}');
-        if c == ',' && depth == 0 {
-            parts.push(String::new());
-        } else {
-            parts.last_mut().unwrap().push(c);
-        }
-    }
-    let parts = parts.iter().map(|part| part.trim());
-    let parts = parts.filter(|part| !part.is_empty());
-    parts
-        .flat_map(|part| expand(&format!("{}{part}", before.trim_start())))
-        .collect()
-}
-
 /// The folder of the crate to which a module belongs; `None` for the program.
 fn crate_of(module: &str) -> Option<&str> {
     let first = module.split('/').next()?;
     let manifest = format!("{}/src/{first}/Cargo.toml", env!("CARGO_MANIFEST_DIR"));
     Path::new(&manifest).exists().then_some(first)
-}
-
-/// The paths in a text that begin with `crate`, `super`, `self` or a crate of the program, those of `use` with
-/// braces included.
-fn paths(text: &str) -> Vec<&str> {
-    let word = |c: char| c.is_alphanumeric() || c == '_';
-    let mut found = Vec::new();
-    let mut from = 0;
-    while let Some(length) = text[from..].find(word) {
-        let start = from + length;
-        let rest = &text[start..];
-        let first = rest.find(|c| !word(c)).unwrap_or(rest.len());
-        let root = ["crate", "super", "self"].contains(&&rest[..first])
-            || rest[..first].starts_with("outcrop_");
-        let mut length = rest.find(|c| !word(c) && c != ':').unwrap_or(rest.len());
-        if root && rest[..length].ends_with("::") && rest[length..].starts_with('{') {
-            let mut depth = 0;
-            let closing = rest[length..].find(|c| {
-                depth += i32::from(c == '{') - i32::from(c == '}');
-                depth == 0
-            });
-            length += closing.expect("a closing brace") + 1;
-        }
-        if root && rest[first..length].starts_with("::") {
-            found.push(&rest[..length]);
-        }
-        from = start + length;
-    }
-    found
-}
-
-/// The modules that a module imports from, by the paths in its text.
-fn imports(module: &str, text: &str, all: &BTreeMap<String, String>) -> BTreeSet<String> {
-    let mut found = BTreeSet::new();
-    for path in paths(text) {
-        let path = path.split_whitespace().collect::<Vec<_>>().join(" ");
-        for path in expand(&path) {
-            let mut at: Vec<&str> = module.split('/').collect();
-            for (number, part) in path.split("::").enumerate() {
-                match part.trim() {
-                    "crate" if number == 0 => at = crate_of(module).into_iter().collect(),
-                    part if number == 0 && part.starts_with("outcrop_") => {
-                        at = vec![&part["outcrop_".len()..]];
-                    }
-                    "self" => {}
-                    "super" => drop(at.pop()),
-                    part => {
-                        at.push(part);
-                        if !all.contains_key(&at.join("/")) {
-                            at.pop();
-                            break;
-                        }
-                    }
-                }
-            }
-            let target = at.join("/");
-            if target != module && all.contains_key(&target) {
-                found.insert(target);
-            }
-        }
-    }
-    found
 }
 
 /// The room of a module: the crate, or, in a crate with several rooms, its folder or file there.
@@ -178,39 +98,24 @@ fn room(module: &str) -> String {
     room.unwrap_or(first).to_owned()
 }
 
-fn graph() -> BTreeMap<String, BTreeSet<String>> {
-    let all = modules();
-    let edges = all
-        .iter()
-        .map(|(module, text)| (module.clone(), imports(module, text, &all)));
-    edges.collect()
-}
-
-#[test]
-fn paths_are_read() {
-    let expanded = expand("crate::a::{b, c::{D, self}, e::F as G}");
-    assert_eq!(
-        expanded,
-        [
-            "crate::a::b",
-            "crate::a::c::D",
-            "crate::a::c::self",
-            "crate::a::e::F"
-        ]
-    );
-    let graph = graph();
-    assert!(graph["pipeline/stages"].contains("mesh/repair"));
-    assert!(graph["disk/spill/table"].contains("disk/workspace/place"));
-    // A path without a `use` line.
-    let text = "fn f() -> super::b::C { outcrop_d::e(crate::g::h) }";
-    assert_eq!(paths(text), ["super::b::C", "outcrop_d::e", "crate::g::h"]);
+fn graph() -> Graph {
+    let mut texts = modules_of("src");
+    texts.remove("main");
+    let root = texts.remove("lib").expect("src/lib.rs");
+    texts.insert(String::new(), root);
+    let crates = texts.keys().filter_map(|module| crate_of(module));
+    let crates = crates.map(str::to_owned).collect();
+    Graph::new(&texts, crates)
 }
 
 #[test]
 fn no_room_knows_more_than_the_map_says() {
     let rules: BTreeMap<&str, &str> = MAY_USE.iter().copied().collect();
     let mut wrong = Vec::new();
-    for (module, targets) in graph() {
+    for (module, targets) in graph().uses {
+        if module.is_empty() {
+            continue;
+        }
         let from = room(&module);
         let Some(allowed) = rules.get(from.as_str()) else {
             let alone = crate_of(&module) == Some(from.as_str());
@@ -220,7 +125,7 @@ fn no_room_knows_more_than_the_map_says() {
         let allowed: BTreeSet<&str> = allowed.split(' ').collect();
         for target in targets {
             let to = room(&target);
-            let same = crate_of(&target) == crate_of(&module);
+            let same = crate_of(&target) == crate_of(&module) && !target.is_empty();
             if same && to != from && !allowed.contains(to.as_str()) {
                 wrong.push(format!("{module} uses {target}"));
             }
@@ -231,47 +136,8 @@ fn no_room_knows_more_than_the_map_says() {
 
 #[test]
 fn no_circle_of_imports() {
-    let mut graph = graph();
-    // Modules whose imports are all removed already are in no circle.
-    loop {
-        let free: Vec<String> = graph
-            .iter()
-            .filter(|(_, targets)| targets.iter().all(|t| !graph.contains_key(t)))
-            .map(|(module, _)| module.clone())
-            .collect();
-        if free.is_empty() {
-            break;
-        }
-        free.iter().for_each(|module| drop(graph.remove(module)));
-    }
-    // A folder's first file and its other files count as one module.
-    let mut circles = BTreeMap::new();
-    for (module, targets) in &graph {
-        let inside = |t: &&String| graph.contains_key(*t) && !module.starts_with(&format!("{t}/"));
-        let inside: Vec<&String> = targets.iter().filter(inside).collect();
-        if !inside.is_empty() {
-            circles.insert(module, inside);
-        }
-    }
-    let reaches = |from: &String, to: &String| {
-        let (mut seen, mut stack) = (BTreeSet::new(), vec![from]);
-        while let Some(at) = stack.pop() {
-            for &next in circles.get(at).into_iter().flatten() {
-                if next == to {
-                    return true;
-                }
-                if seen.insert(next) {
-                    stack.push(next);
-                }
-            }
-        }
-        false
-    };
-    let wrong: Vec<_> = circles
-        .keys()
-        .filter(|module| reaches(module, module))
-        .collect();
-    assert!(wrong.is_empty(), "in circles of imports: {wrong:?}");
+    let circles = graph().circles();
+    assert!(circles.is_empty(), "circles of imports: {circles:#?}");
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! The work of these commands: from arguments to results, without a word on the screen.
 
 use super::super::jobs::Watch;
-use super::super::output::{is_page, write_report};
+use super::super::new_file::is_page;
+use super::super::output::write_report;
 use super::{Advance, After, Plan, Process, Work, shard};
 use crate::pipeline::{self, Advanced, Copies, Reconstruction, Status, Worked};
 use crate::report::Report;

@@ -2,7 +2,7 @@
 
 use super::Mesh;
 use super::spool::{NO_MATERIAL, Spool};
-use crate::ply_mesh::{Failure, converted};
+use crate::failure::{Failure, converted};
 use outcrop_disk::error::Result;
 use outcrop_ply::{MeshStream, Part, SLICE, Scalar};
 use std::path::Path;

@@ -4,8 +4,8 @@ use super::super::contain::contain;
 use super::super::input::Input;
 use super::gps::GpsTimes;
 use super::head::LayerHead;
+use super::laszip::Laszip;
 use super::table::Chunk;
-use super::vlr::Laszip;
 use super::{Header, Record};
 use laz::record::{
     LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor,

@@ -41,7 +41,7 @@ const IN_CITATION: &str = "ESRI PE String =";
 
 /// The reference system of a file, if it gives one.
 pub(super) fn read(input: &Input, header: &Header) -> Option<Crs> {
-    let plain = Records::plain(input, header).take(MOST_RECORDS);
+    let plain = Records::plain(input, header.records()).take(MOST_RECORDS);
     let extended = header.raw.evlr.map(|evlr| {
         let most = MOST_RECORDS.min(evlr.number_of_evlrs as usize);
         Records::extended(input, evlr.start_of_first_evlr).take(most)

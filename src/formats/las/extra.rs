@@ -1,10 +1,9 @@
 //! Extra bytes of a record: their descriptors, a variable-length record of LAS 1.4 that files of lower versions
 //! have too.
 
-use super::super::input::Input;
-use super::Header;
 use super::vlr::Records;
 use outcrop_ply::Scalar;
+use std::ops::Range;
 
 /// The record with the descriptors.
 const USER: &str = "LASF_Spec";
@@ -14,7 +13,7 @@ const NUMBER: u16 = 4;
 const DESCRIPTOR: usize = 192;
 const TYPE: usize = 2;
 const OPTIONS: usize = 3;
-const NAME: std::ops::Range<usize> = 4..36;
+const NAME: Range<usize> = 4..36;
 const SCALE: usize = 112;
 const OFFSET: usize = 136;
 
@@ -110,17 +109,17 @@ impl Value {
     }
 }
 
-/// The extra bytes of a file that are described. Descriptors of more bytes than a record has are left out, and what
-/// cannot be read is none.
-pub(super) fn read(input: &Input, header: &Header) -> Vec<Extra> {
-    let first = usize::from(header.format.len());
-    let end = usize::from(header.record_bytes);
-    if first >= end {
+/// The extra bytes of a file that these records describe; `extra` is where they are in the record of a point.
+/// Descriptors of more bytes are left out, and what cannot be read is none.
+pub(super) fn read(records: Records<'_>, extra: Range<usize>) -> Vec<Extra> {
+    if extra.is_empty() {
         return Vec::new();
     }
-    let mut records = Records::plain(input, header).map_while(Result::ok);
+    let mut records = records.map_while(Result::ok);
     let found = records.find(|(_, vlr)| vlr.user_id == USER && vlr.record_id == NUMBER);
-    found.map_or_else(Vec::new, |(_, vlr)| parse(&vlr.data, first, end))
+    found.map_or_else(Vec::new, |(_, vlr)| {
+        parse(&vlr.data, extra.start, extra.end)
+    })
 }
 
 /// The numbers that are described; the extra bytes are from `at` to `end` of a record.

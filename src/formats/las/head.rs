@@ -2,7 +2,7 @@
 
 use super::super::input::{Input, u32_at};
 use super::Header;
-use super::vlr::{Laszip, layers};
+use super::laszip::{Laszip, layers};
 use outcrop_disk::error::Result;
 
 /// The head of a layered chunk: first record, number of points, sizes of the layers.

@@ -2,10 +2,12 @@
 
 use super::super::input::Input;
 use super::extra::{self, Extra};
+use super::vlr::Records;
 use las::point::Format;
 use las::raw;
 use outcrop_disk::error::Result;
 use std::io::Read;
+use std::ops::Range;
 
 /// Headers of LAS 1.0 to 1.2, of 1.3, which has the offset of waveforms, and of 1.4.
 const SMALLEST: usize = 227;
@@ -40,6 +42,11 @@ pub(super) struct Header {
 }
 
 impl Header {
+    /// The bytes of the file with its variable-length records: between the header and the points.
+    pub(super) fn records(&self) -> Range<u64> {
+        self.raw.header_size.into()..self.data
+    }
+
     /// Reads and checks the header.
     ///
     /// # Errors
@@ -69,7 +76,9 @@ impl Header {
             warnings: Vec::new(),
             raw,
         };
-        header.extra = extra::read(input, &header);
+        let end = usize::from(header.record_bytes);
+        let extra = usize::from(header.format.len())..end;
+        header.extra = extra::read(Records::plain(input, header.records()), extra);
         if header.raw.version.minor > 4 {
             let warning = format!("LAS version {} is read as 1.4", header.raw.version);
             header.warnings.push(warning);

@@ -4,8 +4,8 @@ use super::super::input::{Input, STREAM_BUFFER};
 use super::chunks::Decoder;
 use super::fields::Fields;
 use super::head::LayerHead;
+use super::laszip::{self, Laszip};
 use super::table::{self, Chunk, Table};
-use super::vlr::{self, Laszip};
 use super::{Header, Record, skip};
 use laz::LazItemType;
 use outcrop_disk::error::Result;
@@ -32,7 +32,7 @@ pub(super) fn read(
 ) -> Result<Vec<String>> {
     let mut warnings = Vec::new();
     let workspace = writer.workspace;
-    let laszip = vlr::read(input, header)?;
+    let laszip = laszip::read(input, header)?;
     if header.claimed == 0 && header.data + 8 > input.bytes {
         return Ok(warnings);
     }

@@ -8,6 +8,7 @@ mod fields;
 mod gps;
 mod head;
 mod header;
+mod laszip;
 mod laz;
 mod plain;
 mod skip;

@@ -7,7 +7,7 @@ use super::super::input::Input;
 use super::super::reads::{Means, Reads};
 use super::copc::Hierarchy;
 use super::table::{self, Chunk};
-use super::{Header, position, vlr};
+use super::{Header, laszip, position};
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::Workspace;
 use outcrop_points::crop::Nearby;
@@ -78,7 +78,7 @@ impl Header {
             return Ok(false);
         }
         let places = if self.format.is_compressed {
-            let laszip = vlr::read(input, self)?;
+            let laszip = laszip::read(input, self)?;
             let table = match laszip.stream {
                 true => None,
                 false => table::read(input, self, &laszip, workspace)?,

@@ -4,7 +4,7 @@ use super::super::contain::contain;
 use super::super::input::{Input, u32_at, u64_at};
 use super::Header;
 use super::head::LayerHead;
-use super::vlr::Laszip;
+use super::laszip::Laszip;
 use laz::laszip::ChunkTable;
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::Workspace;

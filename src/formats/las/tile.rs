@@ -3,7 +3,7 @@
 use super::super::input::Input;
 use super::chunks::Decoder;
 use super::fields::{self, Fields};
-use super::{Header, Record, laz, vlr};
+use super::{Header, Record, laszip, laz};
 use outcrop_disk::error::Result;
 use outcrop_points::columns::Column;
 use outcrop_points::native::Native;
@@ -46,7 +46,7 @@ impl Laz {
     ) -> Result<u64> {
         let header = Header::read(node)?;
         self.check(node, &header)?;
-        let laszip = vlr::read(node, &header)?;
+        let laszip = laszip::read(node, &header)?;
         laz::plausible(node, header.claimed)?;
         let fields = Fields::of(&header, writer.wanted);
         let decoder = Decoder {

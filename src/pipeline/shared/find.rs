@@ -1,6 +1,7 @@
 //! The folder of a run that tasks share, by any name that a user has for it: its own, that of the mesh, or that of
 //! the folder for scratch files.
 
+use super::super::away::{below, is_store};
 use super::super::start::scratch_folder;
 use super::place;
 use crate::deliver::SCRATCH;
@@ -30,7 +31,7 @@ pub(super) fn note(mesh: &Path, folder: &Path) -> Result<()> {
         return Ok(());
     }
     let path = note_of(mesh);
-    let whole = match place::is_store(folder) {
+    let whole = match is_store(folder) {
         true => folder.to_path_buf(),
         false => std::path::absolute(folder).map_err(|e| Error::io(folder, "find", e))?,
     };
@@ -58,7 +59,7 @@ fn noted(mesh: &Path) -> Option<PathBuf> {
 /// # Errors
 /// [`Error::NotResumable`] if no run or several are there; [`Error::Io`].
 pub fn shared_folder(given: &Path) -> Result<PathBuf> {
-    if place::is_store(given) {
+    if is_store(given) {
         return in_store(given);
     }
     let mut named = vec![given.to_path_buf()];
@@ -66,7 +67,7 @@ pub fn shared_folder(given: &Path) -> Result<PathBuf> {
         named.push(scratch_folder(given, None));
         named.extend(noted(given));
     }
-    let is_at = |path: &PathBuf| place::is_store(path) || SharedFolder::is_at(path);
+    let is_at = |path: &PathBuf| is_store(path) || SharedFolder::is_at(path);
     if let Some(found) = named.into_iter().find(is_at) {
         return Ok(found);
     }
@@ -100,8 +101,7 @@ fn in_store(given: &Path) -> Result<PathBuf> {
     let runs = names.filter(|name| name.ends_with(SCRATCH));
     only(
         given,
-        runs.map(|name| place::below(given, name.as_ref()))
-            .collect(),
+        runs.map(|name| below(given, name.as_ref())).collect(),
     )
 }
 

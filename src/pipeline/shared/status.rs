@@ -1,6 +1,7 @@
 //! The state of a run that tasks share, for people and scripts.
 
-use super::place::{self, Copies};
+use super::super::away::Copies;
+use super::place;
 use crate::pipeline::manifest::Manifest;
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::away::Traffic;

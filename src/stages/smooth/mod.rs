@@ -17,7 +17,8 @@ mod relax;
 mod tests;
 
 pub use level::Gauge;
-pub use relax::{RelaxStats, Relaxed, relax};
+pub use moves::RelaxStats;
+pub use relax::{Relaxed, relax};
 
 use crate::cells::{Among, Fit, TileRanges, Widen, each_around, each_plane};
 use crate::order::{PointStore, StoredPoints};

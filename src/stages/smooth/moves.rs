@@ -1,12 +1,26 @@
 //! How far points moved: counts by length.
 
-use super::RelaxStats;
 use outcrop_geom::{Point, distance2};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Parts into which the squares of lengths between two powers of two are divided.
 const PARTS: u64 = 64;
+
+/// Counts of this stage.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, PartialEq)]
+pub struct RelaxStats {
+    /// Rounds in which points moved.
+    pub rounds: u32,
+    /// Noisy points, which moved.
+    pub moved: u64,
+    /// Half of them moved at most this far (to within 1 %), in the cloud's unit.
+    pub median: f64,
+    /// 99 % of them moved at most this far (to within 1 %).
+    pub most: f64,
+    /// The largest distance by which one moved.
+    pub largest: f64,
+}
 
 /// Points that moved.
 #[derive(Debug, Default, Serialize, Deserialize)]

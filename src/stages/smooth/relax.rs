@@ -7,7 +7,7 @@
 use super::first::{Decided, FirstRound};
 use super::foot::Feet;
 use super::mover::{Mover, Noisy};
-use super::moves::{Counts, Moves};
+use super::moves::{Counts, Moves, RelaxStats};
 use super::noise::{Found, look};
 use super::pass::Pass;
 use super::{Relaxing, run_of};
@@ -33,21 +33,6 @@ pub struct Relaxed {
     pub noise: Levels,
     /// Counts of the rounds.
     pub stats: RelaxStats,
-}
-
-/// Counts of this stage.
-#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize, PartialEq)]
-pub struct RelaxStats {
-    /// Rounds in which points moved.
-    pub rounds: u32,
-    /// Noisy points, which moved.
-    pub moved: u64,
-    /// Half of them moved at most this far (to within 1 %), in the cloud's unit.
-    pub median: f64,
-    /// 99 % of them moved at most this far (to within 1 %).
-    pub most: f64,
-    /// The largest distance by which one moved.
-    pub largest: f64,
 }
 
 /// The result of a round for some points.

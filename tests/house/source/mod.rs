@@ -1,5 +1,8 @@
 //! The source text of the library, for tests of the code itself.
 
+pub mod graph;
+pub mod tokens;
+
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -26,8 +29,7 @@ pub fn modules_of(source: &str) -> BTreeMap<String, String> {
                 let module = module.strip_suffix("/lib").unwrap_or(module);
                 let text = std::fs::read_to_string(&path).unwrap();
                 let text = text.split("#[cfg(test)]\nmod tests {").next().unwrap();
-                let lines = text.lines().map(|line| line.split("//").next().unwrap());
-                all.insert(module.to_owned(), lines.collect::<Vec<_>>().join("\n"));
+                all.insert(module.to_owned(), tokens::without_comments(text));
             }
         }
     }
