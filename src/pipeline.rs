@@ -11,6 +11,7 @@ mod clock;
 mod close;
 pub mod compare;
 mod disk;
+mod format;
 mod hidden;
 mod identity;
 mod levels;

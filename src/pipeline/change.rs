@@ -23,9 +23,6 @@ const COLUMNS: [(&str, Scalar); 3] = [
     ("significant", Scalar::U8),
 ];
 
-/// The version of what a resumed run reads.
-const FORMAT: &str = "change 1";
-
 /// The measurement of what changed between two surfaces. With a map it can be resumed.
 #[derive(Clone)]
 pub struct ChangeDetection {
@@ -107,7 +104,7 @@ impl ChangeDetection {
         };
         check_output(surfaces, output)?;
         let job = MeshJob {
-            format: FORMAT,
+            kind: "change",
             inputs: &self.surfaces,
             output,
             options: &self.options,

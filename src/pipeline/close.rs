@@ -18,9 +18,6 @@ use outcrop_mesh_files::export;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// The version of what a resumed run reads.
-const FORMAT: &str = "close 1";
-
 /// The making of a mesh without a boundary.
 #[derive(Clone)]
 pub struct Closing {
@@ -78,7 +75,7 @@ impl Closing {
     fn run_to(&self, delivery: Option<&Delivery>) -> Result<CloseReport> {
         check_output(&self.mesh, &self.output)?;
         let job = MeshJob {
-            format: FORMAT,
+            kind: "close",
             inputs: std::slice::from_ref(&self.mesh),
             output: &self.output,
             options: &self.kind,

@@ -2,21 +2,30 @@
 //! resumed only with the same ones.
 
 use super::Reconstruction;
+use super::format::FORMAT;
 use super::identity::{Identity, Name, difference, identities};
 use crate::params::Params;
 use outcrop_disk::error::{Error, Result};
+use outcrop_paper::method::{Constants, METHOD, method_version};
 use outcrop_mesh::surface::evidence::Division;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// The format of scratch folders that this program writes and reads.
-const FORMAT: u32 = 15;
+/// The version of the method, and a checksum of its constants: another build may have others.
+fn method() -> String {
+    let constants: &Constants = &METHOD;
+    let constants = crc32fast::hash(format!("{constants:?}").as_bytes());
+    format!("{} {constants:08x}", method_version!())
+}
 
 /// The manifest of a run.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Manifest {
-    format: u32,
+    /// The format of scratch files.
+    format: String,
     version: String,
+    /// The version of the method, and a checksum of its constants.
+    method: String,
     output: Name,
     params: Params,
     block: u32,
@@ -32,8 +41,9 @@ impl Manifest {
     /// Makes the manifest of a run; samples every input.
     pub fn of(job: &Reconstruction) -> Result<Self> {
         Ok(Self {
-            format: FORMAT,
+            format: FORMAT.into(),
             version: env!("CARGO_PKG_VERSION").into(),
+            method: method(),
             output: Name::of(job.output())?,
             params: job.params.clone(),
             block: job.params.block,
@@ -64,9 +74,11 @@ impl Manifest {
         let value: serde_json::Value = serde_json::from_slice(bytes)
             .map_err(|e| not(format!("its manifest cannot be read: {e}")))?;
         if value["format"] != FORMAT {
+            let found = value["format"]
+                .as_str()
+                .map_or_else(|| value["format"].to_string(), ToString::to_string);
             return Err(not(format!(
-                "its format is {}, this program writes and reads {FORMAT}",
-                value["format"]
+                "another build of the program began it: its format is {found}, this program writes and reads {FORMAT}"
             )));
         }
         serde_json::from_value(value).map_err(|e| not(format!("its manifest cannot be read: {e}")))
@@ -109,6 +121,7 @@ impl Manifest {
         let (was_json, now_json) = (self.json(), now.json());
         for key in [
             "version",
+            "method",
             "output",
             "block",
             "division",
@@ -141,5 +154,58 @@ impl Manifest {
     fn json(&self) -> serde_json::Value {
         // All fields can be represented in JSON.
         serde_json::to_value(self).unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn manifest() -> Manifest {
+        let params = Params::default();
+        Manifest {
+            format: FORMAT.into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            method: method(),
+            output: Name::Text("/mesh.ply".into()),
+            block: params.block,
+            division: params.division,
+            params,
+            tile_points: 1,
+            page_points: 2,
+            inputs: vec![Name::Text("/cloud.laz".into())],
+            files: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn another_format_is_refused() {
+        let (folder, mut other) = (Path::new("/scratch"), manifest());
+        let read = |bytes: &[u8]| Manifest::from_bytes(folder, bytes);
+        read(&other.to_bytes().unwrap()).unwrap();
+        other.format = "0123abcd".into();
+        let bytes = other.to_bytes().unwrap();
+        let numbered = String::from_utf8(bytes.clone()).unwrap();
+        let numbered = numbered.replace("\"0123abcd\"", "15");
+        for (bytes, found) in [(&bytes[..], "0123abcd"), (numbered.as_bytes(), "15")] {
+            let error = read(bytes).unwrap_err();
+            assert!(matches!(error, Error::NotResumable { .. }));
+            let text = error.to_string();
+            let end = format!("its format is {found}, this program writes and reads {FORMAT}");
+            assert!(text.starts_with("/scratch: another build"), "{text}");
+            assert!(text.ends_with(&end), "{text}");
+            assert_eq!(text.lines().count(), 1);
+        }
+    }
+
+    #[test]
+    fn another_method_is_refused() {
+        let (was, mut now) = (manifest(), manifest());
+        was.check(&now, Path::new("/scratch")).unwrap();
+        now.method = "3 01234567".into();
+        let error = was.check(&now, Path::new("/scratch")).unwrap_err();
+        let text = error.to_string();
+        assert!(text.contains("the method was \"3 "), "{text}");
+        assert!(text.contains("now it is \"3 01234567\""), "{text}");
     }
 }

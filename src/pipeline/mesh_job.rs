@@ -3,6 +3,7 @@
 #[cfg(all(test, feature = "cloud"))]
 mod tests;
 
+use super::format::FORMAT;
 use super::identity::{Identity, difference, identities};
 use super::resources::Resources;
 use super::{Start, start::scratch_folder};
@@ -16,8 +17,8 @@ use std::path::{Path, PathBuf};
 
 /// A run that makes something of meshes or clouds.
 pub(super) struct MeshJob<'a, O> {
-    /// The version of what a resumed run reads.
-    pub format: &'static str,
+    /// What it makes.
+    pub kind: &'static str,
     pub inputs: &'a [PathBuf],
     pub output: &'a Path,
     /// The options that decide the result.
@@ -30,6 +31,7 @@ pub(super) struct MeshJob<'a, O> {
 /// Inputs and options of a run, by which it is resumed.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 struct Manifest<O> {
+    /// What it makes, and the format of scratch files.
     format: String,
     version: String,
     inputs: Vec<PathBuf>,
@@ -43,7 +45,7 @@ impl<O: Clone + Serialize> Manifest<O> {
         let whole = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
         let url = job.delivery.map(|delivery| delivery.url().to_path_buf());
         Ok(Self {
-            format: job.format.into(),
+            format: format!("{} {FORMAT}", job.kind),
             version: env!("CARGO_PKG_VERSION").into(),
             inputs: job
                 .inputs

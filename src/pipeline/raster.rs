@@ -11,9 +11,6 @@ use outcrop_survey::raster::{self, Options, Raster};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// The version of what a resumed run reads.
-const FORMAT: &str = "raster 1";
-
 /// The making of a raster of heights, of a mesh or a cloud.
 #[derive(Clone)]
 pub struct Rasterization {
@@ -41,7 +38,7 @@ impl Rasterization {
     pub fn run(&self) -> Result<Raster> {
         self.options.check(&self.source)?;
         let job = MeshJob {
-            format: FORMAT,
+            kind: "raster",
             inputs: std::slice::from_ref(&self.source),
             output: &self.options.output,
             options: &self.options,

@@ -1,8 +1,8 @@
 //! A run that makes a mesh with fewer triangles, and that can be resumed.
 
-use super::hidden::open_of;
 use super::close::{check_output, closed};
 use super::compare;
+use super::hidden::open_of;
 use super::like::Like;
 use super::mesh_job::MeshJob;
 use super::resources::{Resources, resource_setters};
@@ -19,9 +19,6 @@ use outcrop_levels::crossed;
 use outcrop_levels::single::{self, Goal, Options, Simplified};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-/// The version of what a resumed run reads.
-const FORMAT: &str = "simplify 3";
 
 /// The making of a mesh with fewer triangles.
 #[derive(Clone)]
@@ -98,7 +95,7 @@ impl Simplification {
     fn run_to(&self, delivery: Option<&Delivery>) -> Result<SimplifyReport> {
         self.check()?;
         let job = MeshJob {
-            format: FORMAT,
+            kind: "simplify",
             inputs: std::slice::from_ref(&self.mesh),
             output: &self.output,
             options: &(self.options.clone(), self.close),

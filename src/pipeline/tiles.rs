@@ -11,9 +11,6 @@ use outcrop_levels::{Options, TilesReport};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// The version of what a resumed run reads.
-const FORMAT: &str = "tiles 2";
-
 /// The making of a tileset.
 #[derive(Clone)]
 pub struct Tiles {
@@ -70,7 +67,7 @@ impl Tiles {
     fn run_to(&self, delivery: Option<&Delivery>) -> Result<TilesReport> {
         outcrop_levels::check_folder(&self.folder)?;
         let job = MeshJob {
-            format: FORMAT,
+            kind: "tiles",
             inputs: std::slice::from_ref(&self.mesh),
             output: &self.folder,
             options: &self.options,

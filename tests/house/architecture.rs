@@ -2,6 +2,7 @@
 //! manifests hold those between crates), no circle of imports, rows with named fields, and files of limited length.
 
 mod imports;
+mod scratch;
 mod skips;
 
 use crate::source::graph::Graph;

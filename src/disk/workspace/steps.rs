@@ -49,7 +49,7 @@ struct Done<'a, T, F> {
 
 impl<T: Serialize, F: Fn(usize, T) -> Result<()>> Outcome for Done<'_, T, F> {
     fn payload(&self, workspace: &Workspace, items: u64) -> Result<Vec<u8>> {
-        workspace.saved(&(items, &self.value))
+        workspace.saved_as::<T>(&(items, &self.value))
     }
 
     fn hand_on(self: Box<Self>, unit: usize) -> Result<()> {
@@ -58,6 +58,12 @@ impl<T: Serialize, F: Fn(usize, T) -> Result<()>> Outcome for Done<'_, T, F> {
 }
 
 type Work<'a> = dyn Fn(&Unit<'_>) -> Result<Box<dyn Outcome + 'a>> + Sync + 'a;
+
+/// By which a result of another type is noticed, such as a tuple with one more number: another build of the program left
+/// it, whose format of scratch files is the same by the names of types.
+fn type_of<T>() -> [u8; 4] {
+    crc32fast::hash(std::any::type_name::<T>().as_bytes()).to_le_bytes()
+}
 
 /// Inside a step until it is dropped.
 struct Inside<'a>(&'a ResumableRun);
@@ -87,7 +93,7 @@ impl Workspace {
         };
         let path = run.begin(name)?;
         if let Some(payload) = run.payload(&path, 0)? {
-            return self.restored(&payload);
+            return self.restored_as::<T, T>(&payload);
         }
         run.enter(&path);
         let inside = Inside(run);
@@ -98,7 +104,7 @@ impl Workspace {
             &path,
             0,
             unit.end().0.puts,
-            self.saved(&value)?,
+            self.saved_as::<T>(&value)?,
         )?;
         Ok(value)
     }
@@ -140,21 +146,42 @@ impl Workspace {
         })
     }
 
+    /// A value that is or holds a result of type `T`, with what tells the type.
+    fn saved_as<T>(&self, value: &impl Serialize) -> Result<Vec<u8>> {
+        Ok([&type_of::<T>()[..], &self.saved(value)?].concat())
+    }
+
+    /// A result of type `T` from an earlier attempt, with what [`Workspace::saved_as`] saved besides it.
+    fn restored_as<T, V: DeserializeOwned>(&self, payload: &[u8]) -> Result<V> {
+        match payload.split_first_chunk() {
+            Some((found, _)) if *found != type_of::<T>() => {
+                Err(self.corrupt::<T>("a result of another type, left by another build".to_owned()))
+            }
+            Some((_, value)) => self.restored(value),
+            None => self.restored(payload),
+        }
+    }
+
     /// A result from an earlier attempt.
     fn restored<T: DeserializeOwned>(&self, payload: &[u8]) -> Result<T> {
-        let corrupt = |found: String| Error::Corrupt {
+        match postcard::take_from_bytes(payload) {
+            Ok((value, [])) => Ok(value),
+            Ok((_, rest)) => {
+                Err(self.corrupt::<T>(format!("a result with {} bytes more", rest.len())))
+            }
+            Err(error) => {
+                Err(self.corrupt::<T>(format!("a result of {} bytes: {error}", payload.len())))
+            }
+        }
+    }
+
+    /// An error of the journal: `found` instead of a result of type `T`.
+    fn corrupt<T>(&self, found: String) -> Error {
+        Error::Corrupt {
             path: self.path(journal::NAME),
             offset: 0,
             found,
             expected: std::any::type_name::<T>().to_owned(),
-        };
-        match postcard::take_from_bytes(payload) {
-            Ok((value, [])) => Ok(value),
-            Ok((_, rest)) => Err(corrupt(format!("a result with {} bytes more", rest.len()))),
-            Err(error) => Err(corrupt(format!(
-                "a result of {} bytes: {error}",
-                payload.len()
-            ))),
         }
     }
 
@@ -179,7 +206,7 @@ impl Workspace {
             Ok(Box::new(Done { value, hand_on }))
         };
         self.units_of(name.into(), count, &bytes, &work, &|unit, payload| {
-            let (items, value) = self.restored(payload)?;
+            let (items, value) = self.restored_as::<T, (u64, T)>(payload)?;
             self.observer.advance(items);
             hand_on(unit, value)
         })
@@ -345,3 +372,6 @@ impl Step<'_> {
         )
     }
 }
+
+#[cfg(test)]
+mod tests;
