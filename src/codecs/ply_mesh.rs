@@ -6,7 +6,7 @@ use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::compressed::{Beginning, Content};
 use outcrop_platform::FileAt;
-use outcrop_ply::{FileError, FixedMesh, Header, MeshStream, Part, Scalar, System};
+use outcrop_ply::{FixedMesh, Header, MeshStream, Part, Scalar, System};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
