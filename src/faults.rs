@@ -31,8 +31,8 @@ const EVENTS: [(Event, &str); 11] = [
 enum Plan {
     /// End the process at this event.
     Kill(Event, u64),
-    /// Stop, as by SIGSTOP, before a finished journal is published.
-    Freeze,
+    /// Stop, as by SIGSTOP, before this event.
+    Freeze(Event, u64),
     /// Have this number of MiB resident for some seconds before a finished journal is published.
     Hold(u64),
     /// From this event on, all of its kind fail with this number of an error, as on a disk that is full or removed.
@@ -49,7 +49,7 @@ impl Plan {
     fn read(text: &str) -> Option<Self> {
         let (kind, rest) = text.split_once(':')?;
         match kind {
-            "freeze" => return (rest == "publish").then_some(Self::Freeze),
+            "freeze" if rest == "publish" => return Some(Self::Freeze(Event::Publish, 1)),
             "count" => return Some(Self::Count(rest.into())),
             _ => {}
         }
@@ -58,6 +58,7 @@ impl Plan {
             "full" => Self::Fail(Event::Write, DISK_FULL, number),
             "eio" => Self::Fail(Event::Write, DISK_FAILS, number),
             "sync" => Self::Fail(Event::Sync, DISK_FAILS, number),
+            "freeze" => Self::Freeze(Event::Record, number),
             "hold" => Self::Hold(number),
             "most" => Self::Most(number),
             "beat" => Self::Beat(number),
@@ -93,7 +94,7 @@ impl Faults for Planned {
             Plan::Fail(kind, error, at) if kind == event && at <= number => {
                 return Err(io::Error::from_raw_os_error(error));
             }
-            Plan::Freeze if event == Event::Publish => freeze(),
+            Plan::Freeze(kind, at) if kind == event && at == number => freeze(),
             Plan::Hold(mebibytes) if event == Event::Publish => hold(mebibytes << 20),
             _ => {}
         }
@@ -203,5 +204,15 @@ mod tests {
             assert_eq!(Plan::read(text), None, "{text}");
         }
         assert_eq!(Plan::read("torn:3"), Some(Plan::Kill(Event::Torn, 3)));
+        for (text, event, number) in [
+            ("freeze:publish", Event::Publish, 1),
+            ("freeze:7", Event::Record, 7),
+        ] {
+            assert_eq!(
+                Plan::read(text),
+                Some(Plan::Freeze(event, number)),
+                "{text}"
+            );
+        }
     }
 }

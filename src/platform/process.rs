@@ -96,8 +96,23 @@ mod tests {
 
     #[test]
     fn memory_can_be_trimmed_at_any_time() {
+        // Small pieces, of which the last keeps the others from being returned when they are freed.
+        let pieces = |count: usize| (0..count).map(|n| vec![n as u8; 512]).collect::<Vec<_>>();
+        let (freed, kept) = (pieces(200_000), pieces(1000));
+        drop(freed);
+        let (before, mut calls) = (resident(), 0);
         trim(|work| {
-            std::thread::scope(|scope| drop((0..2).map(|_| scope.spawn(work)).collect::<Vec<_>>()));
+            calls += 1;
+            std::thread::scope(|scope| {
+                // One thread is at work with memory meanwhile.
+                let other = scope.spawn(|| pieces(1000));
+                (0..2).for_each(|_| drop(scope.spawn(work)));
+                assert!(other.join().unwrap() == kept);
+            });
         });
+        assert_eq!(calls, u32::from(CAN_TRIM));
+        // 100 MB are free; other tests may have taken some memory since.
+        assert!(!CAN_TRIM || resident() + (50 << 20) < before, "{before}");
+        assert!(kept == pieces(1000));
     }
 }

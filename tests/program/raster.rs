@@ -169,25 +169,37 @@ fn a_killed_run_goes_on_to_the_same_files() {
         ];
         [&common[..], &["-o", output, "--resume"]].concat()
     };
-    told(folder, &words("whole.tif"));
-    for delay in (10..400).step_by(30) {
+    let run = |output, fault: &str| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_outcrop"));
         let command = command.current_dir(folder).arg("raster");
-        let command = command.stdout(std::process::Stdio::null());
-        let mut run = command.args(words("killed.tif")).spawn().expect("it runs");
-        std::thread::sleep(std::time::Duration::from_millis(delay));
-        // It may have ended.
-        let _ = run.kill();
-        run.wait().expect("it ends");
+        let command = command.args(words(output)).env("OUTCROP_FAULT", fault);
+        command.output().expect("it runs")
+    };
+    assert!(run("whole.tif", "count:events").status.success());
+    let events = std::fs::read_to_string(folder.join("events")).expect("counts");
+    let mut kills = 0;
+    for (kind, share) in ["record", "torn", "recorded", "write"]
+        .iter()
+        .flat_map(|kind| (0..4).map(move |share| (kind, share)))
+    {
+        let start = format!("{kind} ");
+        let count = events.lines().find_map(|line| line.strip_prefix(&start));
+        let count: u64 = count.expect(kind).parse().expect("a count");
+        let fault = format!("{kind}:{}", 1 + share * (count - 1) / 4);
+        let killed = run("killed.tif", &fault);
+        assert!(!killed.status.success(), "{fault}");
+        told(folder, &words("killed.tif"));
+        for [whole, killed] in [
+            ["whole.tif", "killed.tif"],
+            ["whole-contours.geojson", "killed-contours.geojson"],
+        ] {
+            let read = |name| std::fs::read(folder.join(name)).expect("a file");
+            assert!(read(whole) == read(killed), "{fault}: {killed}");
+            std::fs::remove_file(folder.join(killed)).expect("a file");
+        }
+        kills += 1;
     }
-    told(folder, &words("killed.tif"));
-    for [whole, killed] in [
-        ["whole.tif", "killed.tif"],
-        ["whole-contours.geojson", "killed-contours.geojson"],
-    ] {
-        let read = |name| std::fs::read(folder.join(name)).expect("a file");
-        assert!(read(whole) == read(killed), "{killed}");
-    }
+    assert_eq!(kills, 16);
     let left: Vec<_> = std::fs::read_dir(folder)
         .expect("a folder")
         .map(|entry| entry.expect("an entry").file_name())

@@ -3,7 +3,7 @@
 
 use super::memory::MemoryPool;
 use super::{IoCounters, limits, lock};
-use crossbeam_channel::{RecvTimeoutError, Sender, bounded};
+use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 use serde::Serialize;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -40,29 +40,15 @@ impl Course {
     pub fn start(memory: MemoryPool, io: Arc<IoCounters>) -> Self {
         let (running, over) = bounded::<()>(0);
         let samples: Arc<Mutex<Vec<Sample>>> = Arc::default();
-        let taken = samples.clone();
-        let begin = Instant::now();
-        let take = move || {
-            let mut pause = FIRST;
-            loop {
-                let mut samples = lock(&taken);
-                samples.push(Sample {
-                    seconds: begin.elapsed().as_secs_f64(),
-                    resident: limits::resident(),
-                    held: memory.held(),
-                    scratch: io.scratch(),
-                });
-                if join(&mut samples) {
-                    pause *= 2;
-                }
-                drop(samples);
-                if over.recv_timeout(pause) != Err(RecvTimeoutError::Timeout) {
-                    break;
-                }
-            }
+        let sampler = Sampler {
+            begin: Instant::now(),
+            pause: FIRST,
+            samples: samples.clone(),
+            memory,
+            io,
         };
         let thread = std::thread::Builder::new().name("outcrop-course".into());
-        let _ = thread.spawn(take);
+        let _ = thread.spawn(move || sampler.run(&over));
         Self {
             samples,
             _running: running,
@@ -73,6 +59,41 @@ impl Course {
     #[must_use]
     pub fn samples(&self) -> Vec<Sample> {
         lock(&self.samples).clone()
+    }
+}
+
+/// Takes the samples.
+struct Sampler {
+    begin: Instant,
+    /// Time to the next sample.
+    pause: Duration,
+    samples: Arc<Mutex<Vec<Sample>>>,
+    memory: MemoryPool,
+    io: Arc<IoCounters>,
+}
+
+impl Sampler {
+    /// Takes samples until it is over.
+    fn run(mut self, over: &Receiver<()>) {
+        loop {
+            self.take();
+            if over.recv_timeout(self.pause) != Err(RecvTimeoutError::Timeout) {
+                break;
+            }
+        }
+    }
+
+    fn take(&mut self) {
+        let mut samples = lock(&self.samples);
+        samples.push(Sample {
+            seconds: self.begin.elapsed().as_secs_f64(),
+            resident: limits::resident(),
+            held: self.memory.held(),
+            scratch: self.io.scratch(),
+        });
+        if join(&mut samples) {
+            self.pause *= 2;
+        }
     }
 }
 
@@ -121,18 +142,28 @@ mod tests {
     }
 
     #[test]
-    fn samples_are_taken_until_the_end() {
+    fn a_sample_has_what_is_held_when_it_is_taken() {
         let workspace = super::super::Workspace::for_tests(1).expect("a scratch folder");
-        let course = Course::start(workspace.memory.clone(), workspace.io.clone());
-        let _held = workspace.reserve("much", 50 << 20).unwrap();
-        let seen = || {
-            course
-                .samples()
-                .iter()
-                .any(|s| s.held >= 50 << 20 && s.resident > 0)
+        let samples: Arc<Mutex<Vec<Sample>>> = Arc::default();
+        let mut sampler = Sampler {
+            begin: Instant::now(),
+            pause: FIRST,
+            samples: samples.clone(),
+            memory: workspace.memory.clone(),
+            io: workspace.io.clone(),
         };
-        while !seen() {
-            std::thread::sleep(Duration::from_millis(1));
-        }
+        sampler.take();
+        let much = workspace.reserve("much", 50 << 20).unwrap();
+        sampler.take();
+        drop(much);
+        // When the run is over, no more are taken than the one at work.
+        let (running, over) = bounded::<()>(0);
+        drop(running);
+        sampler.run(&over);
+        let samples = lock(&samples).clone();
+        let held = [0, 1, 2].map(|n| samples[n].held >= 50 << 20);
+        assert_eq!((samples.len(), held), (3, [false, true, false]));
+        assert!(samples.iter().all(|sample| sample.resident > 0));
+        assert!(samples.is_sorted_by_key(|sample| sample.seconds));
     }
 }

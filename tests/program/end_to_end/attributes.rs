@@ -11,7 +11,6 @@ use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Duration;
 
 /// A point with its values: red, green, blue, and a level that may be negative.
 type Valued = ([i32; 3], [i32; 4]);
@@ -163,15 +162,8 @@ fn bytes_do_not_depend_on_how_it_was_run() {
             .observer(Arc::new(stop));
         assert!(stopped.build().unwrap().run().is_err());
         let again = util::builder(&parts, &mesh, &params).start(Start::Resume);
-        let again = again.build().unwrap();
-        // A program that another test starts holds the lock of the folder for a moment.
-        let run = || match again.run() {
-            Err(Error::Locked { .. }) => None,
-            done => Some(done.unwrap()),
-        };
-        while run().is_none() {
-            std::thread::sleep(Duration::from_millis(20));
-        }
+        // A program that another test starts may hold the lock of the folder for a moment; this waits for it.
+        again.build().unwrap().run().unwrap();
         assert_eq!(util::hash(&mesh), expected);
         std::fs::remove_file(&mesh).unwrap();
     }
