@@ -8,7 +8,7 @@ use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::away::Away;
 use outcrop_disk::workspace::generations::SharedFolder;
 use outcrop_disk::workspace::journal::Sharing;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 pub(super) use store::names;
 
 fn away(url: &Path, copies: &Copies) -> Result<Away> {
