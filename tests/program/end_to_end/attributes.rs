@@ -3,7 +3,7 @@
 use crate::end_to_end::util::{self, Bench};
 use outcrop::Start;
 use outcrop::params::Params;
-use outcrop::{Error, Smooth};
+use outcrop::Smooth;
 use outcrop_cloudgen::{Cloud, Kind};
 use outcrop_disk::workspace::memory::MINIMUM_BUDGET;
 use outcrop_disk::workspace::progress::{Cancel, Observer};

@@ -16,7 +16,7 @@ use crate::ingest::bench::Bench;
 use crate::skip::if_present;
 use kinds::{KINDS, Kind};
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use zoo::ZOO;
 
 const PAGE: &str = include_str!("../../../docs/formats.md");
