@@ -1,9 +1,9 @@
 //! Values of points at the vertices of the mesh: the right ones, in the same bytes whatever the run.
 
 use crate::end_to_end::util::{self, Bench};
+use outcrop::Smooth;
 use outcrop::Start;
 use outcrop::params::Params;
-use outcrop::Smooth;
 use outcrop_cloudgen::{Cloud, Kind};
 use outcrop_disk::workspace::memory::MINIMUM_BUDGET;
 use outcrop_disk::workspace::progress::{Cancel, Observer};
