@@ -6,7 +6,7 @@ mod headers;
 mod text;
 
 use crate::params::Params;
-use crate::pipeline::{Files, Known, unestimated};
+use crate::pipeline::{Files, Known};
 #[cfg(feature = "pages")]
 pub use drawing::{Illustration, illustrated};
 pub use headers::{Headers, headers};
@@ -125,7 +125,7 @@ fn described(
         scanners: true,
         ..params.selection()
     };
-    let headers = Known::from_headers(inputs, &every);
+    let (headers, unestimated) = Known::or_warning(inputs, &every);
     let selection = Selection {
         scanners: false,
         depths: true,
@@ -140,10 +140,8 @@ fn described(
     spool.drop_far(workspace)?;
     observer.end();
     let input = spool.stats().clone();
-    input.warnings.iter().for_each(|w| observer.warn(w));
-    let unestimated = headers.as_ref().err().map(unestimated);
-    unestimated.iter().for_each(|w| observer.warn(w));
-    let headers = headers.ok();
+    let warnings = input.warnings.iter().chain(&unestimated);
+    warnings.for_each(|w| observer.warn(w));
     let lattice = spool.choose_lattice(0)?;
     if let Some(sketch) = &mut sketch {
         sketch.count(&spool, &lattice, workspace)?;

@@ -42,7 +42,7 @@ use checks::{not_an_input, one_system, writable};
 pub(crate) use clock::Clock;
 #[cfg(feature = "levels")]
 pub use close::Closing;
-pub(crate) use disk::{Files, Known, unestimated};
+pub(crate) use disk::{Files, Known};
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
 use outcrop_disk::workspace::progress::{Cancel, Observer};

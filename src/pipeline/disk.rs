@@ -133,11 +133,6 @@ impl Text {
 /// Decimals assumed as long as they are unknown.
 const DECIMALS: usize = 3;
 
-/// The warning of a run whose inputs were readable, but not all of their headers.
-pub(crate) fn unestimated(error: &Error) -> String {
-    format!("disk space was not estimated from headers: {error}")
-}
-
 impl Known {
     /// The properties in the headers of the inputs. They may be wrong, but cannot exceed the sizes of the
     /// files.
@@ -166,6 +161,17 @@ impl Known {
         known.values += made(&selection.attributes);
         known.double = double(&probes);
         Ok(known)
+    }
+
+    /// As [`Self::from_headers`]; instead of an error the warning for a run that could read the points nevertheless.
+    pub fn or_warning(inputs: &[PathBuf], selection: &Selection) -> (Option<Self>, Option<String>) {
+        match Self::from_headers(inputs, selection) {
+            Ok(known) => (Some(known), None),
+            Err(e) => {
+                let warning = format!("disk space was not estimated from headers: {e}");
+                (None, Some(warning))
+            }
+        }
     }
 
     /// Checks that the mesh of the points will not exceed a limit of the format of `output`. Refused is what

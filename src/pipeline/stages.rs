@@ -14,7 +14,7 @@ mod warnings;
 
 use super::checks::{all_are_kept, disk_radius, enough, room};
 use super::disk::{DISTINCT, NORMAL, SCANNER, SURE, Text, made};
-use super::{Clock, Files, Known, Reconstruction, unestimated};
+use super::{Clock, Files, Known, Reconstruction};
 use crate::params::Method;
 use crate::report::{LatticeReport, Report};
 use export::written;
@@ -67,7 +67,6 @@ pub(super) struct Stages<'a> {
     clock: Clock<'a>,
     begin: Instant,
     known: Known,
-    /// Why headers did not tell it.
     unestimated: Option<String>,
     carried: Carried,
     report: Report,
@@ -86,12 +85,10 @@ impl<'a> Stages<'a> {
     pub fn begin(job: &'a Reconstruction, workspace: &'a Workspace) -> Result<Self> {
         // A task leaves the check of disk space to the process that began its generation.
         // With a region, headers do not tell how many points there will be.
-        let headers = match workspace.is_task() || job.params.crop.is_some() {
-            true => Ok(None),
-            false => Known::from_headers(&job.inputs, &job.params.selection()).map(Some),
+        let (headers, unestimated) = match workspace.is_task() || job.params.crop.is_some() {
+            true => (None, None),
+            false => Known::or_warning(&job.inputs, &job.params.selection()),
         };
-        let unestimated = headers.as_ref().err().map(unestimated);
-        let headers = headers.unwrap_or_default();
         let first = headers.map(|known| known.estimate(&job.params, Files::of_job(job)));
         let mut exceeded = None;
         if let Some(known) = headers.filter(|_| all_are_kept(&job.params)) {
@@ -207,11 +204,7 @@ impl<'a> Stages<'a> {
         let narrow = params.narrow_margin(&input, &*job.observer);
         self.report.input = input;
         self.warn_of_input();
-        // A header that makes points unreadable too is an error that was told before this.
-        let unestimated = self.unestimated.take().into_iter();
-        unestimated
-            .chain(narrow)
-            .for_each(|warning| self.warn(warning));
+        narrow.into_iter().for_each(|warning| self.warn(warning));
         self.check_room()?;
         let moves = params.smooth.rounds() + params.relax > 0;
         let lattice = spool.choose_lattice(if moves { HALVINGS } else { 0 })?;

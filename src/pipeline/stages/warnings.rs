@@ -10,7 +10,9 @@ impl Stages<'_> {
     pub(super) fn warn_of_input(&mut self) {
         let input = &self.report.input;
         let warnings = [input.warnings.clone(), self.carried.warnings.clone()];
-        for warning in warnings.concat() {
+        // A header that makes points unreadable too was an error before this.
+        let unestimated = self.unestimated.take();
+        for warning in warnings.concat().into_iter().chain(unestimated) {
             self.warn(warning);
         }
     }
