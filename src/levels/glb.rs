@@ -7,7 +7,6 @@ use super::writer::{Grids, Placed, Writer};
 use outcrop_codecs::glb::{COMPRESSION, FLOAT, SHORT, header};
 use outcrop_codecs::light;
 use outcrop_codecs::meshopt;
-use outcrop_disk::error::Result;
 use outcrop_ply::Scalar;
 use serde_json::{Value, json};
 
@@ -49,11 +48,11 @@ pub(super) fn write(
     triangles: &[[u32; 3]],
     boundary: &[[u32; 2]],
     (grids, columns): (&Grids<'_>, &Columns),
-) -> Result<Written> {
+) -> Written {
     let mut writer = Writer::default();
     let placed = match grids.lossy {
-        true => lossy::positions(&mut writer, node, depth, grids)?,
-        false => positions(&mut writer, node, depth, grids)?,
+        true => lossy::positions(&mut writer, node, depth, grids),
+        false => positions(&mut writer, node, depth, grids),
     };
     let mut attributes = placed.attributes;
     let normals: Vec<u8> = match grids.lossy {
@@ -65,21 +64,21 @@ pub(super) fn write(
     };
     let accessor = json!({ "componentType": 5120, "normalized": true, "type": "VEC3" });
     attributes["NORMAL"] = writer
-        .attribute(&normals, 4, Some("OCTAHEDRAL"), accessor)?
+        .attribute(&normals, 4, Some("OCTAHEDRAL"), accessor)
         .into();
     match grids.lossy {
-        true => lossy::values(&mut writer, node, columns, &mut attributes)?,
-        false => values(&mut writer, node, columns, &mut attributes)?,
+        true => lossy::values(&mut writer, node, columns, &mut attributes),
+        false => values(&mut writer, node, columns, &mut attributes),
     }
     let vertices = node.ids.len();
     let packed = (meshopt::triangles(triangles), "TRIANGLES");
-    let indices = writer.indices(packed, 3 * triangles.len(), vertices)?;
+    let indices = writer.indices(packed, 3 * triangles.len(), vertices);
     let mut primitives = vec![json!({
         "attributes": attributes, "indices": indices, "mode": 4, "material": 0,
     })];
     if !boundary.is_empty() {
         let packed = (meshopt::sequence(boundary.as_flattened()), "INDICES");
-        let indices = writer.indices(packed, 2 * boundary.len(), vertices)?;
+        let indices = writer.indices(packed, 2 * boundary.len(), vertices);
         primitives.push(json!({
             "attributes": attributes, "indices": indices, "mode": 1, "material": 0,
         }));
@@ -115,14 +114,14 @@ pub(super) fn write(
     });
     let mut file = header(json.to_string().into_bytes(), writer.bytes.len() as u64);
     file.extend_from_slice(&writer.bytes);
-    Ok(Written {
+    Written {
         file,
         moved: placed.moved,
-    })
+    }
 }
 
 /// Positions as whole steps from the place, in the filter `EXPONENTIAL`, and the bits that this leaves out.
-fn positions(writer: &mut Writer, node: &Node, depth: u32, grids: &Grids<'_>) -> Result<Placed> {
+fn positions(writer: &mut Writer, node: &Node, depth: u32, grids: &Grids<'_>) -> Placed {
     let place = place(node, grids);
     let exponent = grids.hidden(depth, super::node::INNER);
     let mut data = Vec::with_capacity(12 * node.points.len());
@@ -146,27 +145,22 @@ fn positions(writer: &mut Writer, node: &Node, depth: u32, grids: &Grids<'_>) ->
         low.extend_from_slice(&[0, 0]);
     }
     let accessor = json!({ "componentType": FLOAT, "type": "VEC3", "min": min, "max": max });
-    let position = writer.attribute(&data, 12, Some("EXPONENTIAL"), accessor)?;
+    let position = writer.attribute(&data, 12, Some("EXPONENTIAL"), accessor);
     let mut attributes = json!({ "POSITION": position });
     if any {
         let accessor = json!({ "componentType": SHORT, "type": "VEC3" });
-        attributes["_LOW"] = writer.attribute(&low, 8, None, accessor)?.into();
+        attributes["_LOW"] = writer.attribute(&low, 8, None, accessor).into();
     }
-    Ok(Placed {
+    Placed {
         attributes,
         place,
         bits: 0,
         moved: 0.0,
-    })
+    }
 }
 
 /// Colours and other values.
-fn values(
-    writer: &mut Writer,
-    node: &Node,
-    columns: &Columns,
-    attributes: &mut Value,
-) -> Result<()> {
+fn values(writer: &mut Writer, node: &Node, columns: &Columns, attributes: &mut Value) {
     let each = columns.words();
     let column = |number: usize| node.values.iter().skip(number).step_by(each.max(1));
     let mut number = 0;
@@ -180,7 +174,7 @@ fn values(
             data.extend_from_slice(&[0, 0]);
         }
         let accessor = json!({ "componentType": SHORT, "normalized": true, "type": "VEC3" });
-        attributes["COLOR_0"] = writer.attribute(&data, 8, None, accessor)?.into();
+        attributes["COLOR_0"] = writer.attribute(&data, 8, None, accessor).into();
         number = 1;
     }
     for (other, number) in columns.others().zip(number..) {
@@ -192,7 +186,6 @@ fn values(
             data.extend_from_slice(&[0; 4][bytes..]);
         }
         let accessor = json!({ "componentType": component(scalar), "type": "SCALAR" });
-        attributes[&*other.attribute] = writer.attribute(&data, 4, None, accessor)?.into();
+        attributes[&*other.attribute] = writer.attribute(&data, 4, None, accessor).into();
     }
-    Ok(())
 }

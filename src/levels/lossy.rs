@@ -6,7 +6,6 @@ use super::node::{Node, squared};
 use super::writer::{Grids, Placed, Writer};
 use outcrop_codecs::glb::{FLOAT, SHORT};
 use outcrop_codecs::light;
-use outcrop_disk::error::Result;
 use outcrop_ply::Scalar;
 use rustc_hash::FxHashSet;
 use serde_json::{Value, json};
@@ -41,12 +40,7 @@ pub(super) fn arranged(node: &Node, depth: u32, grids: &Grids<'_>) -> (Node, usi
 
 /// Positions as whole numbers of the coarsest step that they have in common: 16 bits if they fit, which takes less
 /// than the filter `EXPONENTIAL`.
-pub(super) fn positions(
-    writer: &mut Writer,
-    node: &Node,
-    depth: u32,
-    grids: &Grids<'_>,
-) -> Result<Placed> {
+pub(super) fn positions(writer: &mut Writer, node: &Node, depth: u32, grids: &Grids<'_>) -> Placed {
     let shown = shown(node, depth, grids);
     let ways = shown.iter().zip(&node.points).map(|(p, q)| squared(*p, *q));
     let moved2 = ways.fold(0.0, f64::max);
@@ -84,13 +78,13 @@ pub(super) fn positions(
     };
     let (min, max) = (ends(-1.0), ends(1.0));
     let accessor = json!({ "componentType": component, "type": "VEC3", "min": min, "max": max });
-    let position = writer.attribute(&data, stride, filter, accessor)?;
-    Ok(Placed {
+    let position = writer.attribute(&data, stride, filter, accessor);
+    Placed {
         attributes: json!({ "POSITION": position }),
         place: std::array::from_fn(|axis| bounds.min[axis] + (middle[axis] << bits)),
         bits,
         moved: moved2.sqrt(),
-    })
+    }
 }
 
 /// The triangles that are drawn, and the others: those whose corners are no three positions, if triangles that are
@@ -140,12 +134,7 @@ pub(super) fn normals(normals: &[[i8; 2]]) -> Vec<u8> {
 }
 
 /// Colours and other values.
-pub(super) fn values(
-    writer: &mut Writer,
-    node: &Node,
-    columns: &Columns,
-    attributes: &mut Value,
-) -> Result<()> {
+pub(super) fn values(writer: &mut Writer, node: &Node, columns: &Columns, attributes: &mut Value) {
     let each = columns.words();
     let column = |number: usize| node.values.iter().skip(number).step_by(each.max(1));
     let mut number = 0;
@@ -157,7 +146,7 @@ pub(super) fn values(
         };
         let data: Vec<u8> = column(0).flat_map(bytes).collect();
         let accessor = json!({ "componentType": 5121, "normalized": true, "type": "VEC3" });
-        attributes["COLOR_0"] = writer.attribute(&data, 4, None, accessor)?.into();
+        attributes["COLOR_0"] = writer.attribute(&data, 4, None, accessor).into();
         number = 1;
     }
     for (other, number) in columns.others().zip(number..) {
@@ -179,9 +168,8 @@ pub(super) fn values(
                 (all.iter().flat_map(word).collect(), None)
             }
         };
-        attributes[&*other.attribute] = writer.attribute(&data, 4, filter, accessor)?.into();
+        attributes[&*other.attribute] = writer.attribute(&data, 4, filter, accessor).into();
     }
-    Ok(())
 }
 
 /// The value of a word of a node.

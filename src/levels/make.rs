@@ -186,7 +186,7 @@ impl Maker<'_> {
         let lines = boundary(node);
         let triangles = &node.triangles[..drawn];
         let about = (&grids, &self.intake.columns);
-        let written = glb::write((node, depth), triangles, &lines, about)?;
+        let written = glb::write((node, depth), triangles, &lines, about);
         let words: Vec<LevelWord> = bytemuck::allocation::pod_collect_to_vec(&written.file);
         self.files.put(unit, number, &words)?;
         Ok(Made {

@@ -3,9 +3,7 @@
 use super::lattice::Lattice;
 use outcrop_codecs::glb::{INDEX, SHORT, View};
 use outcrop_codecs::meshopt;
-use outcrop_disk::error::{Error, Result};
 use serde_json::{Value, json};
-use std::path::Path;
 
 /// The grids of a tileset.
 #[derive(Debug, Clone)]
@@ -52,11 +50,6 @@ pub(super) struct Writer {
     pub decoded: usize,
 }
 
-/// The data, if they could be encoded.
-fn encoded(data: std::io::Result<Vec<u8>>) -> Result<Vec<u8>> {
-    data.map_err(|e| Error::io(Path::new("tile"), "encode", e))
-}
-
 impl Writer {
     /// Adds a buffer view of compressed data; returns its number.
     fn view(&mut self, compressed: &[u8], view: &View<'_>) -> usize {
@@ -80,9 +73,9 @@ impl Writer {
         stride: usize,
         filter: Option<&str>,
         mut accessor: Value,
-    ) -> Result<usize> {
+    ) -> usize {
         let count = data.len() / stride;
-        let packed = encoded(meshopt::vertices(data, stride))?;
+        let packed = meshopt::vertices(data, stride);
         let view = View {
             stride,
             count,
@@ -93,17 +86,16 @@ impl Writer {
         accessor["bufferView"] = view.into();
         accessor["count"] = count.into();
         self.accessors.push(accessor);
-        Ok(self.accessors.len() - 1)
+        self.accessors.len() - 1
     }
 
     /// Adds indices of corners or ends, encoded so.
     pub fn indices(
         &mut self,
-        (packed, mode): (std::io::Result<Vec<u8>>, &str),
+        (packed, mode): (Vec<u8>, &str),
         count: usize,
         vertices: usize,
-    ) -> Result<usize> {
-        let packed = encoded(packed)?;
+    ) -> usize {
         let (stride, component) = match vertices < 1 << 16 {
             true => (2, SHORT),
             false => (4, INDEX),
@@ -118,6 +110,6 @@ impl Writer {
         self.accessors.push(json!({
             "bufferView": view, "componentType": component, "count": count, "type": "SCALAR",
         }));
-        Ok(self.accessors.len() - 1)
+        self.accessors.len() - 1
     }
 }

@@ -80,21 +80,18 @@ pub fn compress<P: Parts>(
     let colours = colours(writer, unit, &ids, &order)?;
     let _colours = unit.hold(bytes_of(&colours));
     let words = meshopt::words(&steps);
-    let pack = || {
-        Ok([
-            meshopt::vertices(bytemuck::cast_slice(&words.words), 12)?,
-            match normals.is_empty() {
-                true => Vec::new(),
-                false => meshopt::vertices(bytemuck::cast_slice(&normals), 12)?,
-            },
-            match colours.is_empty() {
-                true => Vec::new(),
-                false => meshopt::vertices(&colours, COLOUR)?,
-            },
-            meshopt::triangles(&triangles)?,
-        ])
-    };
-    let views = pack().map_err(|e| writer.file.failed("compress", e))?;
+    let views = [
+        meshopt::vertices(bytemuck::cast_slice(&words.words), 12),
+        match normals.is_empty() {
+            true => Vec::new(),
+            false => meshopt::vertices(bytemuck::cast_slice(&normals), 12),
+        },
+        match colours.is_empty() {
+            true => Vec::new(),
+            false => meshopt::vertices(&colours, COLOUR),
+        },
+        meshopt::triangles(&triangles),
+    ];
     let about = About {
         vertices: order.len() as u32,
         triangles: triangles.len() as u32,
