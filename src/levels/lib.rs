@@ -24,7 +24,10 @@ mod make;
 mod meet;
 mod nearest;
 mod node;
+mod order;
 pub mod outlook;
+mod patch;
+mod quadric;
 mod remaining;
 mod report;
 mod rounding;
@@ -38,7 +41,6 @@ mod tree;
 mod writer;
 
 pub use report::{Lossy, Options, TilesReport};
-pub use simplify::{Manner, Quadrics, Simplifier, Surface};
 pub use system::epsg;
 
 use cells::Division;
@@ -145,7 +147,6 @@ fn make(
         low_bits,
         lossy: options.lossy,
         most: options.most_triangles,
-        simplifier: &Quadrics,
         files: Table::new("levels.tiles", 0),
         made: Vec::new(),
     };

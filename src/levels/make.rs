@@ -7,9 +7,10 @@ use super::intake::Intake;
 use super::lossy;
 use super::nearest;
 use super::node::{Bounds, INNER, Node};
+use super::order;
 use super::rows::LevelWord;
 use super::shared::{Shared, boundary, bytes};
-use super::simplify::{Manner, Simplifier, Surface, failed};
+use super::simplify::{self, Manner, Surface};
 use super::tree::TreeNode;
 use super::writer::Grids;
 use outcrop_disk::error::Result;
@@ -62,7 +63,6 @@ pub(super) struct Maker<'a> {
     pub lossy: bool,
     /// Most triangles of a cell.
     pub most: u32,
-    pub simplifier: &'a dyn Simplifier,
     /// The GLB files, as words, by tile.
     pub files: Table<LevelWord>,
     pub made: Vec<Made>,
@@ -158,7 +158,7 @@ impl Maker<'_> {
         let work = |unit: &Unit<'_>| {
             let cell = unit.number();
             let node = shared.node(unit, cell)?;
-            let node = node.with_triangles(&ordered(&node)?);
+            let node = ordered(&node);
             let mut made = this.write(unit, (cell, list[cell].depth), &node)?;
             made.error = made.moved;
             stored.put(unit, cell, &node.to_words())?;
@@ -245,23 +245,23 @@ impl Maker<'_> {
         let is_root = number + 1 == self.nodes.len();
         let count = joined.triangles.len();
         let mut target = target(count, self.most);
-        let mut manner = Manner::Careful;
+        let mut manner: Manner = simplify::careful;
         let below = children.iter().map(|child| &self.made[*child]);
         let (below, moved) = below.fold((0.0f64, 0.0f64), |(error, moved), child| {
             (error.max(child.error - child.moved), moved.max(child.moved))
         });
         let points = Points::of(&joined, *depth);
         loop {
-            let triangles = points.simplify(&joined, target, manner, self.simplifier)?;
+            let triangles = points.simplify(&joined, target, manner);
             let node = joined.with_triangles(&triangles);
-            let node = node.with_triangles(&ordered(&node)?);
+            let node = ordered(&node);
             let mut made = self.write(unit, (number, *depth), &node)?;
             if is_root && made.bytes as usize > ROOT_BYTES && !triangles.is_empty() {
+                // Many small components do not become few triangles otherwise.
+                if triangles.len() > target {
+                    manner = simplify::coarse;
+                }
                 target = target.min(triangles.len()) * 2 / 3;
-                manner = match manner {
-                    Manner::Careful => Manner::Pruning,
-                    _ => Manner::Coarse,
-                };
                 continue;
             }
             let own = points.distance(&joined, &triangles);
@@ -284,14 +284,9 @@ impl Maker<'_> {
     }
 }
 
-/// The triangles in an order that compresses well.
-fn ordered(node: &Node) -> Result<Vec<[u32; 3]>> {
-    let mut workspace = meshoptimizer_rs::Workspace::default();
-    let indices = node.triangles.as_flattened();
-    let ordered =
-        meshoptimizer_rs::optimize_vertex_cache_strip(indices, node.ids.len(), &mut workspace);
-    let ordered = ordered.map_err(|e| failed("order triangles", e))?;
-    Ok(ordered.as_chunks().0.to_vec())
+/// The node with its triangles in an order that compresses well.
+fn ordered(node: &Node) -> Node {
+    node.with_triangles(&order::of(node.ids.len(), &node.triangles))
 }
 
 /// The node that has the triangles of all these: vertices of several become one.
@@ -350,25 +345,18 @@ impl Points {
         }
     }
 
-    fn simplify(
-        &self,
-        node: &Node,
-        target: usize,
-        manner: Manner,
-        simplifier: &dyn Simplifier,
-    ) -> Result<Vec<[u32; 3]>> {
-        let points: Vec<[f32; 3]> = self.points.iter().map(|p| p.map(|x| x as f32)).collect();
+    fn simplify(&self, node: &Node, target: usize, manner: Manner) -> Vec<[u32; 3]> {
         let surface = Surface {
-            points: &points,
+            points: &self.points,
             triangles: &node.triangles,
             locked: &self.locked,
         };
-        let triangles = simplifier.simplify(surface, target, manner)?;
-        // Whatever the library does, tiles have no cracks.
-        Ok(match self.keeps_borders(node, &triangles) {
+        let triangles = manner(surface, target);
+        // However it is simplified, tiles have no cracks.
+        match self.keeps_borders(node, &triangles) {
             true => triangles,
             false => node.triangles.clone(),
-        })
+        }
     }
 
     /// True if all locked vertices are corners of these triangles. One on the boundary of the mesh may be missing: the

@@ -1,7 +1,7 @@
 //! Contraction of edges, cheapest first.
 
-use super::patch::{Around, Patch, is_gone};
-use super::quadric::{V3, minus};
+use crate::patch::{Around, Patch};
+use crate::quadric::{V3, minus};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
@@ -196,9 +196,4 @@ pub(super) fn contract(patch: &mut Patch, end: End) -> (Curve, f64) {
         }
     }
     (curve, farthest)
-}
-
-/// The triangles that are left.
-pub(super) fn left(patch: &Patch) -> impl Iterator<Item = &[u32; 3]> {
-    patch.triangles.iter().filter(|t| !is_gone(t))
 }

@@ -1,7 +1,7 @@
 //! The mesh that a pass leaves: vertices by block of their old numbers, triangles by cell.
 
-use super::quadric::{NUMBERS, Quadric};
 use crate::intake::BLOCK;
+use crate::quadric::{NUMBERS, Quadric};
 use crate::rows::{CellTriangle, KeptValue, KeptVertex};
 use outcrop_codecs::ply_mesh::{SLICE, Sink};
 use outcrop_disk::error::{Error, Result};

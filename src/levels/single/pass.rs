@@ -1,12 +1,12 @@
 //! A pass: the mesh is divided into cells, and each is simplified.
 
-use super::collapse::{Curve, End, contract, left};
+use super::collapse::{Curve, End, contract};
 use super::kept::Kept;
-use super::patch::{Patch, Vertices};
-use super::quadric::{NUMBERS, Quadric};
 use super::{Intake, Options};
 use crate::cells::{self, Cells, Division};
 use crate::intake::{BLOCK, Stored};
+use crate::patch::{Patch, Vertices};
+use crate::quadric::{NUMBERS, Quadric};
 use crate::rows::{CellTriangle, CellVertex, KeptValue, KeptVertex, SharedVertex};
 use crate::shared::{local, share_vertices};
 use outcrop_disk::error::Result;
@@ -168,7 +168,8 @@ impl<'a> Pass<'a> {
             let cell = unit.number();
             let (mut patch, ids, foreign) = self.load(unit, cell)?;
             let (_, distance2) = contract(&mut patch, end);
-            let mut rows: Vec<CellTriangle> = left(&patch)
+            let mut rows: Vec<CellTriangle> = patch
+                .left()
                 .map(|corners| CellTriangle {
                     corners: least_first(corners.map(|v| ids[v as usize])),
                 })
@@ -240,7 +241,8 @@ fn least_first([a, b, c]: [u32; 3]) -> [u32; 3] {
 /// The vertices that triangles have.
 fn used(patch: &Patch) -> Vec<u32> {
     let mut is_used = vec![false; patch.points.len()];
-    left(patch)
+    patch
+        .left()
         .flatten()
         .for_each(|v| is_used[*v as usize] = true);
     let all = is_used.iter().zip(0u32..);

@@ -1,10 +1,6 @@
 //! A reader of tilesets, for tests: every tile as triangles with exact coordinates.
 
-use meshoptimizer_rs::Workspace;
-use meshoptimizer_rs::codec::{
-    decode_filter_exp, decode_filter_oct, decode_index_buffer, decode_index_sequence,
-    decode_vertex_buffer,
-};
+use outcrop_codecs::meshopt;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -92,18 +88,8 @@ fn data(json: &Value, binary: &[u8], accessor: &Value) -> (Vec<u8>, usize) {
     assert_eq!(accessor["count"].as_u64(), Some(count as u64));
     assert_eq!(view["byteLength"].as_u64(), Some((count * stride) as u64));
     let source = &binary[number("byteOffset")..][..number("byteLength")];
-    let workspace = &mut Workspace::default();
-    let mut decoded = match packed["mode"].as_str().unwrap() {
-        "ATTRIBUTES" => decode_vertex_buffer(count, stride, source, workspace),
-        "TRIANGLES" => decode_index_buffer(count, stride, source, workspace),
-        _ => decode_index_sequence(count, stride, source, workspace),
-    }
-    .unwrap();
-    match packed["filter"].as_str() {
-        Some("EXPONENTIAL") => decode_filter_exp(&mut decoded, count, stride, workspace).unwrap(),
-        Some("OCTAHEDRAL") => decode_filter_oct(&mut decoded, count, stride, workspace).unwrap(),
-        _ => {}
-    }
+    let names = (packed["mode"].as_str().unwrap(), packed["filter"].as_str());
+    let decoded = meshopt::decode(names, (count, stride), source).unwrap();
     (decoded, stride)
 }
 

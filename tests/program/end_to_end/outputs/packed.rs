@@ -2,12 +2,11 @@
 
 use super::cloud;
 use crate::end_to_end::util::{self, Bench};
-use meshoptimizer_rs::Workspace;
-use meshoptimizer_rs::codec::{decode_filter_exp, decode_index_buffer, decode_vertex_buffer};
 use outcrop::Error;
 use outcrop::Start;
 use outcrop::params::Params;
 use outcrop_cloudgen::{Cloud, Kind};
+use outcrop_codecs::meshopt;
 use outcrop_disk::workspace::memory::MINIMUM_BUDGET;
 use outcrop_ply::{Header, Property, Scalar};
 use serde_json::Value;
@@ -58,19 +57,15 @@ fn decoded(document: &Value, buffer: &[u8], accessor: &Value) -> Vec<u8> {
     assert_eq!(number(&view["byteLength"]), count * stride);
     assert_eq!(number(&accessor["count"]), count);
     let source = &buffer[at..at + length];
-    let workspace = &mut Workspace::default();
-    if packed["mode"] == "TRIANGLES" {
-        return decode_index_buffer(count, stride, source, workspace).unwrap();
+    let names = (packed["mode"].as_str().unwrap(), packed["filter"].as_str());
+    if names.0 == "ATTRIBUTES" {
+        // Versions other than 0 need an extension that fewer readers have.
+        assert_eq!(source[0], 0xa0);
+        assert!([None, Some("EXPONENTIAL")].contains(&names.1));
+    } else {
+        assert_eq!(names, ("TRIANGLES", None));
     }
-    assert_eq!(packed["mode"], "ATTRIBUTES");
-    // Versions other than 0 need an extension that fewer readers have.
-    assert_eq!(source[0], 0xa0);
-    let mut bytes = decode_vertex_buffer(count, stride, source, workspace).unwrap();
-    match packed["filter"].as_str() {
-        Some("EXPONENTIAL") => decode_filter_exp(&mut bytes, count, stride, workspace).unwrap(),
-        other => assert_eq!(other, None),
-    }
-    bytes
+    meshopt::decode(names, (count, stride), source).unwrap()
 }
 
 fn read(path: &Path) -> Packed {

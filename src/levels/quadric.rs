@@ -40,6 +40,24 @@ pub(super) fn cross(p: V3, q: V3) -> V3 {
 /// part of the weight of the planes.
 const PULL: f64 = 1e-4;
 
+/// The quadrics of vertices: the planes of their triangles, by area.
+pub(super) fn of_triangles(points: &[V3], triangles: &[[u32; 3]]) -> Vec<Quadric> {
+    let mut all = vec![Quadric::default(); points.len()];
+    for triangle in triangles {
+        let [a, b, c] = triangle.map(|v| points[v as usize]);
+        let normal = cross(minus(b, a), minus(c, a));
+        let twice = dot(normal, normal).sqrt();
+        if twice > 0.0 {
+            for v in *triangle {
+                let quadric = &mut all[v as usize];
+                quadric.add_plane(normal.map(|x| x / twice), twice / 2.0);
+                quadric.area += twice / 2.0;
+            }
+        }
+    }
+    all
+}
+
 impl Quadric {
     /// The plane with this unit normal through the vertex.
     pub fn add_plane(&mut self, n: V3, weight: f64) {
@@ -61,6 +79,11 @@ impl Quadric {
             xy * d[0] + yy * d[1] + yz * d[2],
             xz * d[0] + yz * d[1] + zz * d[2],
         ]
+    }
+
+    /// Its value at the vertex.
+    pub fn here(&self) -> f64 {
+        self.c
     }
 
     /// Its value at the vertex + `d`.

@@ -1,6 +1,6 @@
 //! The triangles of a cell while edges are contracted: fans of vertices, and what a contraction would do to them.
 
-use super::quadric::{NUMBERS, Quadric, V3, cross, dot, minus};
+use super::quadric::{NUMBERS, Quadric, V3, cross, dot, minus, of_triangles};
 
 /// The end of a list.
 const NONE: u32 = u32::MAX;
@@ -86,11 +86,11 @@ impl Patch {
         let is_first = vertices.quadrics.is_empty();
         let mut patch = Self {
             blended: vertices.blended,
-            points: vertices.points,
             quadrics: match is_first {
-                true => vec![Quadric::default(); count],
+                true => of_triangles(&vertices.points, &triangles),
                 false => vertices.quadrics,
             },
+            points: vertices.points,
             values: vertices.values,
             locked: vertices.locked,
             boundary: vec![false; count],
@@ -105,9 +105,6 @@ impl Patch {
             let vertex = patch.triangles[corner / 3][corner % 3] as usize;
             patch.next[corner] = patch.head[vertex];
             patch.head[vertex] = corner as u32;
-        }
-        if is_first {
-            patch.add_planes();
         }
         patch.look_at_edges(is_first);
         patch.lock_pinches();
@@ -126,20 +123,6 @@ impl Patch {
 
     fn corners(&self, triangle: u32) -> [V3; 3] {
         self.triangles[triangle as usize].map(|v| self.points[v as usize])
-    }
-
-    fn add_planes(&mut self) {
-        for triangle in 0..self.triangles.len() {
-            let normal = normal(self.corners(triangle as u32));
-            let twice = dot(normal, normal).sqrt();
-            if twice > 0.0 {
-                for v in self.triangles[triangle] {
-                    let quadric = &mut self.quadrics[v as usize];
-                    quadric.add_plane(normal.map(|x| x / twice), twice / 2.0);
-                    quadric.area += twice / 2.0;
-                }
-            }
-        }
     }
 
     /// All sides of triangles: smaller end, larger end, and the triangle, with a bit for the direction.
@@ -260,7 +243,7 @@ impl Patch {
             list.clear();
         }
         self.fan(a, of_a);
-        self.neighbours(a, &of_a.clone(), neighbours);
+        self.neighbours(a, of_a, neighbours);
         self.fan(b, of_b);
         let has = |all: &[[u32; 3]], t: &u32, v: u32| all[*t as usize].contains(&v);
         of_b.retain(|t| !has(&self.triangles, t, a));
@@ -379,6 +362,26 @@ impl Patch {
             self.head[at] = self.head[from];
             self.head[from] = NONE;
         }
+    }
+
+    /// Removes all triangles that hang together with a vertex.
+    pub fn remove(&mut self, vertex: u32) {
+        let (mut open, mut fan) = (vec![vertex], Vec::new());
+        while let Some(vertex) = open.pop() {
+            fan.clear();
+            self.fan(vertex, &mut fan);
+            self.count -= fan.len();
+            for triangle in &fan {
+                let corners = &mut self.triangles[*triangle as usize];
+                open.extend(*corners);
+                corners[0] = NONE;
+            }
+        }
+    }
+
+    /// The triangles that are left.
+    pub fn left(&self) -> impl Iterator<Item = &[u32; 3]> {
+        self.triangles.iter().filter(|t| !is_gone(t))
     }
 
     /// Values of a vertex.
