@@ -10,8 +10,6 @@ pub use histogram::{Bin, Histogram};
 pub use outcrop_disk::workspace::course::Sample;
 use outcrop_draw::histogram;
 #[cfg(feature = "pages")]
-pub use outcrop_draw::mesh::Drawn;
-#[cfg(feature = "pages")]
 pub use outcrop_draw::picture::Picture;
 #[cfg(feature = "levels")]
 pub use outcrop_levels::TilesReport;
@@ -20,6 +18,8 @@ pub use outcrop_mesh::stitch::{BaseStats, InsertStats};
 pub use outcrop_mesh::triples::TripleStats;
 pub use outcrop_mesh_files::cut::CutStats;
 pub use outcrop_mesh_files::export::{CoordinateType, MeshStats};
+#[cfg(feature = "pages")]
+pub use outcrop_pictures::mesh::Drawn;
 pub use outcrop_points::{Attribute, IngestStats};
 pub use outcrop_stages::cells::{CellStats, DiskStats};
 pub use outcrop_stages::normals::NormalStats;

@@ -1,9 +1,5 @@
-//! Pictures and histograms: of the mesh while it is in the scratch folder, and of a cloud.
+//! Pictures and histograms, in bounded memory, whatever they are of.
 
-#[cfg(feature = "pictures")]
-pub mod cloud;
 pub mod histogram;
-#[cfg(feature = "pictures")]
-pub mod mesh;
 #[cfg(feature = "pictures")]
 pub mod picture;

@@ -1,6 +1,7 @@
 //! A measurement of change: the new mesh with the distance from the old surface as columns of its vertices.
 
 use super::Start;
+use super::compare::clouds;
 use super::like::{Like, is_one_of};
 use super::mesh_job::MeshJob;
 use super::resources::{Resources, resource_setters};
@@ -9,7 +10,6 @@ use outcrop_codecs::ply_mesh::{PlyMesh, Sink};
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::progress::{Cancel, Observer};
 use outcrop_disk::workspace::{Storage, Workspace};
-use outcrop_formats::ingest_selected;
 use outcrop_inspect::change::{self, Change, ChangeRow, Changes, Options, ROWS, State};
 use outcrop_mesh_files::export::{self, VertexColumn};
 use outcrop_ply::Scalar;
@@ -60,8 +60,7 @@ impl ChangeDetection {
     /// unfinished run without an output; those of an unfinished run, as of [`crate::Reconstruction::run`].
     pub fn run(&self) -> Result<Change> {
         let measure = |[old, new]: [&Path; 2], workspace: &Workspace| {
-            let (found, changes) =
-                change::change(old, new, &self.options, ingest_selected, workspace)?;
+            let (found, changes) = change::change(old, new, &self.options, clouds, workspace)?;
             Ok((found, changes, ()))
         };
         self.mapped(measure, |_, ()| Ok(()))
@@ -77,7 +76,7 @@ impl ChangeDetection {
         show: impl FnOnce(&Change, &change::Illustration) -> Result<()>,
     ) -> Result<Change> {
         let measure = |[old, new]: [&Path; 2], workspace: &Workspace| {
-            change::illustrated(old, new, &self.options, ingest_selected, workspace)
+            change::illustrated(old, new, &self.options, clouds, workspace)
         };
         self.mapped(measure, |found, drawn| show(found, &drawn))
     }

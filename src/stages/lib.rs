@@ -3,6 +3,7 @@
 
 pub mod ids;
 
+pub mod cloud;
 pub mod order;
 
 pub mod tiles;

@@ -33,7 +33,7 @@ pub use report::Change;
 pub use rows::{ChangeRow, Changes, ROWS, State};
 
 use crate::compare::shape::Shape;
-use crate::compare::{Kind, Side, read_side_once};
+use crate::compare::{Clouds, Kind, Side, read_side_once};
 use areas::{Areas, Sums, Units};
 use measure::Measure;
 use outcrop_codecs::ply_mesh::PlyMesh;
@@ -41,7 +41,6 @@ use outcrop_disk::error::{Error, Result};
 use outcrop_disk::spill::{LocalTable, Sorter};
 use outcrop_disk::workspace::{Unit, Workspace};
 use outcrop_geom::vector::V3;
-use outcrop_points::Ingest;
 use rows::sections;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -90,8 +89,8 @@ impl Witness for () {
     fn gone(&mut self, _: V3) {}
 }
 
-/// Measures what changed from an old surface or cloud to a new mesh; `ingest` reads
-/// clouds.
+/// Measures what changed from an old surface or cloud to a new mesh; `clouds` reads
+/// those.
 ///
 /// # Errors
 /// [`Error::Input`] for a file that cannot be read, is empty, or has faces that are not triangles, and for a new one
@@ -101,10 +100,10 @@ pub fn change(
     old: &Path,
     new: &Path,
     options: &Options,
-    ingest: Ingest,
+    clouds: Clouds,
     workspace: &Workspace,
 ) -> Result<(Change, Changes)> {
-    let (found, rows, ()) = seen([old, new], options, ingest, workspace, |_, _| Ok(()))?;
+    let (found, rows, ()) = seen([old, new], options, clouds, workspace, |_, _| Ok(()))?;
     Ok((found, rows))
 }
 
@@ -117,11 +116,11 @@ pub fn illustrated(
     old: &Path,
     new: &Path,
     options: &Options,
-    ingest: Ingest,
+    clouds: Clouds,
     workspace: &Workspace,
 ) -> Result<(Change, Changes, Illustration)> {
     let draw = |new: &Shape, old: &Shape| drawing::Drawing::of(new, old, workspace);
-    let (found, rows, drawing) = seen([old, new], options, ingest, workspace, draw)?;
+    let (found, rows, drawing) = seen([old, new], options, clouds, workspace, draw)?;
     let illustration = drawing.finish(&found, &rows, workspace)?;
     Ok((found, rows, illustration))
 }
@@ -130,16 +129,16 @@ pub fn illustrated(
 fn seen<W: Witness>(
     [old, path]: [&Path; 2],
     options: &Options,
-    ingest: Ingest,
+    clouds: Clouds,
     workspace: &Workspace,
     begin: impl FnOnce(&Shape, &Shape) -> Result<W>,
 ) -> Result<(Change, Changes, W)> {
     check(options)?;
-    let new = read_side_once(path, "change.new", ingest, workspace)?;
+    let new = read_side_once(path, "change.new", clouds, workspace)?;
     if new.side.kind == Kind::Cloud {
         return Err(Error::input(path, "new surface", "a cloud", "a mesh"));
     }
-    let old = read_side_once(old, "change.old", ingest, workspace)?;
+    let old = read_side_once(old, "change.old", clouds, workspace)?;
     let scale = lengths(options, &old.side, &new.side);
     let mut witness = begin(&new, &old)?;
     let units = Units::of(&old.side.bounds().union(new.side.bounds()));

@@ -1,4 +1,5 @@
 use super::*;
+use outcrop_formats::ingest_selected;
 use outcrop_geom::vector::V3;
 use std::io::Write;
 use std::path::PathBuf;
@@ -32,6 +33,16 @@ fn surface(path: &Path, side: f64, n: usize, height: impl Fn(f64, f64) -> f64) -
     path.to_path_buf()
 }
 
+/// The points of a cloud, in the order of their ids.
+fn clouds(
+    path: &Path,
+    keep: bool,
+    workspace: &Workspace,
+    each: &mut dyn FnMut(u64, &[V3]) -> Result<()>,
+) -> Result<bool> {
+    outcrop_stages::cloud::positions(path, ingest_selected, keep, workspace, each)
+}
+
 /// The change between two surfaces, and the rows.
 fn changed(
     old: &Path,
@@ -39,7 +50,7 @@ fn changed(
     options: &Options,
     workspace: &Workspace,
 ) -> (Change, Vec<ChangeRow>) {
-    let (found, changes) = change(old, new, options, workspace).unwrap();
+    let (found, changes) = change(old, new, options, clouds, workspace).unwrap();
     let rows = (0..changes.count()).flat_map(|section| changes.get(section).unwrap());
     (found, rows.collect())
 }
@@ -125,7 +136,7 @@ fn a_cloud_can_be_the_old_surface() {
     assert!((middle - 0.5).abs() < 1e-6, "{middle}");
     assert!((found.gained / 50.0 - 1.0).abs() < 0.05, "{}", found.gained);
     // A new surface has to have normals.
-    let refused = change(&new, &old, &Options::default(), &workspace).unwrap_err();
+    let refused = change(&new, &old, &Options::default(), clouds, &workspace).unwrap_err();
     assert!(refused.to_string().contains("a mesh"), "{refused}");
 }
 

@@ -4,68 +4,44 @@ use super::pages::PageWriter;
 use super::shape::{Items, Kind, Shape, side, unusable, usable};
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::{Unit, Workspace};
-use outcrop_points::{Ingest, Selection};
-use outcrop_stages::order::order;
+use outcrop_geom::vector::V3;
 use std::path::Path;
 
-/// Points per page of the store between ingest and the pages.
-const STORE_PAGE: usize = 1 << 12;
+/// Reads a cloud: gives the number of its distinct points, and the positions of some, in the order of a curve, until
+/// all are given. Its scratch files stay if the second argument is true. It returns false if positions were rounded.
+pub type Clouds =
+    fn(&Path, bool, &Workspace, &mut dyn FnMut(u64, &[V3]) -> Result<()>) -> Result<bool>;
 
-/// Reads a cloud by `ingest`; duplicates become one point. If there is a unit, the pages survive the attempt.
+/// Reads a cloud. If there is a unit, the pages survive the attempt.
 pub(super) fn read(
     path: &Path,
     name: &'static str,
-    ingest: Ingest,
+    clouds: Clouds,
     unit: Option<&Unit<'_>>,
     workspace: &Workspace,
 ) -> Result<Shape> {
-    let observer = &workspace.observer;
-    observer.begin("read cloud", "points", 0);
-    let spool = ingest(&[path.to_path_buf()], &Selection::default(), workspace)?;
-    observer.end();
-    let stats = spool.stats();
-    stats.warnings.iter().for_each(|w| observer.warn(w));
-    let kept = stats.kept;
-    if kept == 0 {
-        let found = match stats.read {
-            0 => "none".to_owned(),
-            n => format!("none of {n} usable"),
+    let (mut writer, mut count) = (None, 0);
+    // A unit that is killed before its end needs the scratch files again.
+    let exact = clouds(path, unit.is_some(), workspace, &mut |all, positions| {
+        count = all;
+        let writer = match &mut writer {
+            Some(writer) => writer,
+            None => writer.insert(PageWriter::new(workspace, name, all, unit)?),
         };
-        return Err(Error::input(path, "points", found, "one or more"));
-    }
-    let lattice = spool.choose_lattice(0).map_err(|error| match error {
-        Error::Degenerate { found } => Error::input(path, "points", found, "smaller ones"),
-        other => other,
+        positions
+            .iter()
+            .try_for_each(|position| match usable(*position) {
+                true => writer.push(*position),
+                false => Err(unusable(path, "points", *position)),
+            })
     })?;
-    observer.begin("order", "points", kept);
-    let (stored, ..) = order(spool, &lattice, STORE_PAGE, workspace)?;
-    observer.end();
-    let store = stored.open(workspace)?;
-
-    let count = store.len() as u64;
-    let mut writer = PageWriter::new(workspace, name, count, unit)?;
-    let _held = workspace.reserve("compare: points at hand", STORE_PAGE as u64 * 12)?;
-    let mut points = Vec::new();
-    for page in 0..store.pages() {
-        workspace.check_cancel()?;
-        points.clear();
-        store.read_pages(page..page + 1, &mut points)?;
-        for point in &points {
-            let position = lattice.position(*point);
-            if !usable(position) {
-                return Err(unusable(path, "points", position));
-            }
-            writer.push(position)?;
-        }
-    }
-    if unit.is_none() {
-        // A unit that is killed before its end needs them again.
-        stored.release(workspace)?;
-    }
+    let Some(writer) = writer else {
+        return Err(Error::input(path, "points", "none", "one or more"));
+    };
     let pages = writer.finish()?;
     let mut side = side(path, Kind::Cloud, pages.bounds());
     side.points = count;
-    side.exact = lattice.exact;
+    side.exact = exact;
     Ok(Shape {
         name,
         side,

@@ -29,6 +29,7 @@ pub(crate) mod shape;
 mod tests;
 mod triangles;
 
+pub use cloud::Clouds;
 #[cfg(feature = "pictures")]
 pub use drawing::Illustration;
 use figures::DistanceRow;
@@ -45,7 +46,6 @@ use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::{Unit, Workspace};
 #[cfg(feature = "pictures")]
 use outcrop_draw::picture::Picture;
-use outcrop_points::Ingest;
 use samples::Numbers;
 use shape::Shape;
 use std::path::Path;
@@ -73,10 +73,10 @@ pub(crate) fn read_side(
     path: &Path,
     name: &'static str,
     options: &Options,
-    ingest: Ingest,
+    clouds: Clouds,
     workspace: &Workspace,
 ) -> Result<Shape> {
-    read_by(path, name, options, (ingest, None), workspace)
+    read_by(path, name, options, (clouds, None), workspace)
 }
 
 /// If there is a unit, the pages survive the attempt once it is finished.
@@ -84,13 +84,13 @@ fn read_by(
     path: &Path,
     name: &'static str,
     options: &Options,
-    (ingest, unit): (Ingest, Option<&Unit<'_>>),
+    (clouds, unit): (Clouds, Option<&Unit<'_>>),
     workspace: &Workspace,
 ) -> Result<Shape> {
     if path.is_file() && holds_faces(path)? {
         mesh::read(path, name, options, unit, workspace)
     } else {
-        cloud::read(path, name, ingest, unit, workspace)
+        cloud::read(path, name, clouds, unit, workspace)
     }
 }
 
@@ -98,7 +98,7 @@ fn read_by(
 pub(crate) fn read_side_once(
     path: &Path,
     name: &'static str,
-    ingest: Ingest,
+    clouds: Clouds,
     workspace: &Workspace,
 ) -> Result<Shape> {
     let options = Options {
@@ -106,14 +106,14 @@ pub(crate) fn read_side_once(
         seed: 0,
     };
     let make = |unit: &Unit<'_>| {
-        let shape = read_by(path, name, &options, (ingest, Some(unit)), workspace)?;
+        let shape = read_by(path, name, &options, (clouds, Some(unit)), workspace)?;
         let kept = shape.kept();
         Ok((shape, kept))
     };
     workspace.once_opened(name, make, |kept| kept.open(path, name, workspace))
 }
 
-/// Distances between two shapes, each a mesh (PLY with faces) or a cloud, which `ingest` reads.
+/// Distances between two shapes, each a mesh (PLY with faces) or a cloud, which `clouds` reads.
 ///
 /// # Errors
 /// [`Error::Input`] for a file that cannot be read, is empty, or has faces that are not triangles;
@@ -122,10 +122,10 @@ pub(crate) fn read_side_once(
 pub fn compare(
     both: [&Path; 2],
     options: &Options,
-    ingest: Ingest,
+    clouds: Clouds,
     workspace: &Workspace,
 ) -> Result<Comparison> {
-    let compared = measured(both, options, ingest, workspace, |_, _, _| Ok(()));
+    let compared = measured(both, options, clouds, workspace, |_, _, _| Ok(()));
     compared.map(|(comparison, ())| comparison)
 }
 
@@ -137,11 +137,11 @@ pub fn compare(
 pub fn illustrated(
     both: [&Path; 2],
     options: &Options,
-    ingest: Ingest,
+    clouds: Clouds,
     workspace: &Workspace,
 ) -> Result<(Comparison, Illustration)> {
     let draw = |a: &Shape, b: &Shape, diagonal: f64| Drawing::of(a, b, diagonal, workspace);
-    let (comparison, drawing) = measured(both, options, ingest, workspace, draw)?;
+    let (comparison, drawing) = measured(both, options, clouds, workspace, draw)?;
     let illustration = drawing.finish(comparison.symmetric.figures.p99, workspace)?;
     Ok((comparison, illustration))
 }
@@ -177,7 +177,7 @@ pub(crate) fn marked(
 fn measured<W: Witness>(
     [a, b]: [&Path; 2],
     options: &Options,
-    ingest: Ingest,
+    clouds: Clouds,
     workspace: &Workspace,
     begin: impl FnOnce(&Shape, &Shape, f64) -> Result<W>,
 ) -> Result<(Comparison, W)> {
@@ -189,8 +189,8 @@ fn measured<W: Witness>(
             expected: "1 or more".into(),
         });
     }
-    let a = read_side(a, "compare.a", options, ingest, workspace)?;
-    let b = read_side(b, "compare.b", options, ingest, workspace)?;
+    let a = read_side(a, "compare.a", options, clouds, workspace)?;
+    let b = read_side(b, "compare.b", options, clouds, workspace)?;
     let number = Numbers::of(&a, samples).all() + Numbers::of(&b, samples).all();
     let bytes = number * size_of::<DistanceRow>() as u64;
     let buffer = bytes.min(workspace.memory.available() / 8) + (1 << 20);
@@ -243,13 +243,13 @@ pub struct Measured {
 pub fn distances(
     cloud: &Path,
     to: &Path,
-    ingest: Ingest,
+    clouds: Clouds,
     workspace: &Workspace,
     mut each: impl FnMut(Measured) -> Result<()>,
 ) -> Result<u64> {
-    let cloud = cloud::read(cloud, "compare.a", ingest, None, workspace)?;
+    let cloud = cloud::read(cloud, "compare.a", clouds, None, workspace)?;
     let options = |samples| Options { samples, seed: 0 };
-    let to = read_side(to, "compare.b", &options(0), ingest, workspace)?;
+    let to = read_side(to, "compare.b", &options(0), clouds, workspace)?;
     let mut index = 0;
     let all = options(u64::MAX);
     measure::distances(&cloud, &to, &all, workspace, |sample, distance| {

@@ -10,11 +10,11 @@ use outcrop_disk::error::Error;
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::course::Course;
 use outcrop_disk::workspace::limits;
-#[cfg(feature = "pages")]
-use outcrop_draw::mesh::{Finished, Subject, draw};
 use outcrop_geom::lattice::Lattice;
 use outcrop_mesh::repair::Repaired;
 use outcrop_mesh_files::cut::StoredPieces;
+#[cfg(feature = "pages")]
+use outcrop_pictures::mesh::{Finished, Subject, draw};
 use outcrop_stages::blocks::Blocks;
 use outcrop_stages::order::PointStore;
 

@@ -10,13 +10,13 @@ mod tests;
 
 pub use source::Finished;
 
-use crate::histogram::{Histogram, Tally};
-use crate::picture::{Canvas, Map, OBLIQUE, Picture, TOP, canvas_bytes, map_bytes};
 use border::{BorderEdge, Boundary};
 use outcrop_disk::error::Result;
 use outcrop_disk::spill::Sorter;
 use outcrop_disk::workspace::memory::{bytes_of, table_bytes};
 use outcrop_disk::workspace::{Unit, Workspace, lock};
+use outcrop_draw::histogram::{Histogram, Tally};
+use outcrop_draw::picture::{Canvas, Map, OBLIQUE, Picture, TOP, canvas_bytes, map_bytes};
 use outcrop_geom::{Point, distance2};
 use outcrop_paper::method::METHOD;
 use outcrop_raster::{Vec3, View};

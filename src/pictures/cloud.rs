@@ -1,9 +1,9 @@
 //! Pictures of a cloud.
 
-use crate::histogram::{Histogram, Tally};
-use crate::picture::{Canvas, Map, OBLIQUE, Picture, SIZE, canvas_bytes, map_bytes};
 use outcrop_disk::error::Result;
 use outcrop_disk::workspace::Workspace;
+use outcrop_draw::histogram::{Histogram, Tally};
+use outcrop_draw::picture::{Canvas, Map, OBLIQUE, Picture, SIZE, canvas_bytes, map_bytes};
 use outcrop_geom::Point;
 use outcrop_geom::lattice::Lattice;
 use outcrop_ply::Scalar;

@@ -1,10 +1,10 @@
 //! Edges with one triangle: found by part, cancelled where two parts meet, and joined to loops.
 
 use super::source::Part;
-use crate::histogram::Tally;
 use outcrop_disk::error::Result;
 use outcrop_disk::spill::{LocalTable, Sorted, row};
 use outcrop_disk::workspace::Workspace;
+use outcrop_draw::histogram::Tally;
 use outcrop_geom::Point;
 use outcrop_stages::ids::Id;
 
