@@ -6,8 +6,8 @@ use super::format::FORMAT;
 use super::identity::{Identity, Name, difference, identities};
 use crate::params::Params;
 use outcrop_disk::error::{Error, Result};
-use outcrop_paper::method::{Constants, METHOD, method_version};
 use outcrop_mesh::surface::evidence::Division;
+use outcrop_paper::method::{Constants, METHOD, method_version};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 

@@ -1,6 +1,5 @@
 //! Odd, old, empty and broken files: each has its expected outcome, without a panic.
 
-
 use outcrop_disk::workspace::Workspace;
 use outcrop_disk::workspace::memory::{MINIMUM_BUDGET, MemoryPool};
 use outcrop_disk::workspace::progress::{Cancel, Silent};

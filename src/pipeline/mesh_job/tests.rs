@@ -45,7 +45,7 @@ fn another_version_behind_a_url_is_noticed() {
     let inputs = [serve(&tag)];
     let (resources, output) = (Resources::default(), Path::new("out.tif"));
     let job = MeshJob {
-        format: "test",
+        kind: "test",
         inputs: &inputs,
         output,
         options: &(),

@@ -3,6 +3,7 @@
 use super::{Options, Raster, Surface, raster};
 use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::Workspace;
+use outcrop_formats::ingest_selected;
 use outcrop_geom::region::Region;
 use proptest::prelude::*;
 use std::fmt::Write;
@@ -87,7 +88,7 @@ fn field(
 }
 
 fn run(source: &Path, options: &Options) -> Result<Raster> {
-    raster(source, options, &Workspace::for_tests(2)?)
+    raster(source, options, ingest_selected, &Workspace::for_tests(2)?)
 }
 
 fn open(path: &Path) -> Decoder<std::io::BufReader<std::fs::File>> {
@@ -356,7 +357,7 @@ proptest! {
             contours: Some((0.5, folder.path("lines.geojson"))),
             ..folder.options(cell)
         };
-        let made = raster(&source, &options, &Workspace::for_tests(threads).unwrap()).unwrap();
+        let made = raster(&source, &options, ingest_selected, &Workspace::for_tests(threads).unwrap()).unwrap();
         let middles = |k: u32| (made.min[0] / cell).round() * cell + (f64::from(k) + 0.5) * cell;
         let inside = (0..made.columns).filter(|k| (shift..=shift + 3.0).contains(&middles(*k)));
         let inside = inside.count() as u64;

@@ -27,5 +27,5 @@ mod stop;
 mod systems;
 mod text;
 mod topology;
-mod util;
+pub mod util;
 mod versions;

@@ -1,7 +1,6 @@
 //! Shared by the end-to-end tests: generated clouds, runs of the library and of the program, and their
 //! results.
 
-
 use outcrop::inspect::verify::{Verdict, verify};
 use outcrop::params::Params;
 use outcrop::report::Report;

@@ -1,6 +1,5 @@
 //! Generated files of every kind, read back as lattice positions.
 
-
 mod belong;
 mod bench;
 mod bombs;

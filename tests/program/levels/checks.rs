@@ -141,8 +141,8 @@ pub fn errors_are_true(case: &Case) {
                 full.push(&tiles[child]);
             }
         }
-        let distance =
-            crate::levels::meshes::distance(&[tile], &full).max(crate::levels::meshes::distance(&full, &[tile]));
+        let distance = crate::levels::meshes::distance(&[tile], &full)
+            .max(crate::levels::meshes::distance(&full, &[tile]));
         let distance = distance * case.tileset.step;
         assert!(
             distance <= tile.error,

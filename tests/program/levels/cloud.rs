@@ -3,6 +3,7 @@
 use outcrop::inspect::compare;
 use outcrop::levels::cloud::{CloudReport, tileset};
 use outcrop::{Cancel, Error, MemoryPool, Silent, Workspace};
+use outcrop_formats::ingest_selected;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -46,7 +47,14 @@ fn made(
 ) -> outcrop::Result<CloudReport> {
     let (pool, place) = (MemoryPool::new(memory)?, tempfile::tempdir().unwrap());
     let workspace = Workspace::new(place.path(), pool, threads, Arc::new(Silent), Cancel::new())?;
-    let report = tileset(cloud, "the cloud", folder, most, &workspace);
+    let report = tileset(
+        cloud,
+        "the cloud",
+        folder,
+        most,
+        ingest_selected,
+        &workspace,
+    );
     drop(workspace);
     let left = std::fs::read_dir(place.path()).unwrap().count();
     assert_eq!(left, 0, "scratch files are left");

@@ -1,7 +1,7 @@
 //! Scratch files that are damaged, cut short, deleted or replaced; full disks.
 
+use crate::end_to_end::util;
 use crate::resume::run::{Case, ROBUST, copy};
-use crate::resume::util;
 use std::collections::BTreeSet;
 use std::path::Path;
 

@@ -1,6 +1,6 @@
 //! A mesh that turns out to be too large for its format is written in another one, without its work being done again.
 
-use crate::resume::util::{self, Bench, Said};
+use crate::end_to_end::util::{self, Bench, Said};
 use outcrop_cloudgen::{Cloud, Kind};
 use std::path::{Path, PathBuf};
 

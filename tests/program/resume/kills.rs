@@ -1,7 +1,7 @@
 //! Runs killed at events after which something is durable. `scripts/kill-test` covers all events.
 
+use crate::end_to_end::util;
 use crate::resume::run::{Case, FILTERS, PAPER, ROBUST};
-use crate::resume::util;
 
 /// Kills a run at every `step`th event of some kinds and resumes it.
 fn survives(options: &[&str], step: u64, kinds: &[&str]) {

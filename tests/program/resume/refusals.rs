@@ -1,7 +1,7 @@
 //! Runs that are not resumed, and the reasons.
 
+use crate::end_to_end::util::{self, Said};
 use crate::resume::run::{Case, PAPER, ROBUST};
-use crate::resume::util::{self, Said};
 use std::os::unix::fs::PermissionsExt;
 use std::process::Stdio;
 

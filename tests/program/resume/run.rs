@@ -1,6 +1,6 @@
 //! A small cloud with many blocks and tiles, and interrupted runs of it.
 
-use crate::resume::util::{self, Bench, Said};
+use crate::end_to_end::util::{self, Bench, Said};
 use outcrop_cloudgen::{Cloud, Kind};
 use std::collections::HashMap;
 use std::hash::{Hash, Hasher};

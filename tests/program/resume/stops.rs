@@ -1,6 +1,6 @@
 //! Signals and time limits stop a run soon, and it can be resumed.
 
-use crate::resume::util::{self, Bench, Said};
+use crate::end_to_end::util::{self, Bench, Said};
 use outcrop_cloudgen::{Cloud, Kind};
 use rustix::process::{Pid, Signal, WaitOptions, kill_process, waitpid};
 use std::path::PathBuf;

@@ -1,7 +1,7 @@
 //! A run that is started again while the process before it still ends.
 
+use crate::end_to_end::util;
 use crate::resume::run::{Case, PAPER};
-use crate::resume::util;
 use std::io::{BufRead, BufReader, Read};
 use std::process::Stdio;
 

@@ -1,7 +1,7 @@
 //! The mesh is that of one process for any number of shards, threads, workers and any memory.
 
+use crate::end_to_end::util;
 use crate::shared::run::Case;
-use crate::shared::util;
 
 /// Runs with several shards, threads, budgets and workers.
 fn equal(options: &[&str], plans: &[&[&str]]) {

@@ -1,7 +1,7 @@
 //! The command lines of `deploy`, run with the index variable of their platform.
 
+use crate::end_to_end::util;
 use crate::shared::run::Case;
-use crate::shared::util;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -1,7 +1,7 @@
 //! Tasks and the work between generations are killed, late, done twice, or damaged.
 
+use crate::end_to_end::util;
 use crate::shared::run::{Case, wait_until};
-use crate::shared::util;
 use rustix::process::{Pid, Signal, kill_process};
 use std::os::unix::process::ExitStatusExt;
 use std::process::{Child, Stdio};

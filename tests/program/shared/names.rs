@@ -1,6 +1,6 @@
 //! A run has three names: that of its folder, of its mesh, and of the folder for scratch files.
 
-use crate::shared::util::{self, Bench, Said};
+use crate::end_to_end::util::{self, Bench, Said};
 use outcrop_cloudgen::{Cloud, Kind};
 use std::path::{Path, PathBuf};
 

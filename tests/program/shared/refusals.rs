@@ -1,7 +1,7 @@
 //! Commands that cannot do what they are asked for say why, and change nothing.
 
+use crate::end_to_end::util;
 use crate::shared::run::Case;
-use crate::shared::util;
 
 #[test]
 fn what_does_not_fit_the_plan_is_refused() {

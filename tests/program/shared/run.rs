@@ -1,6 +1,6 @@
 //! A small cloud with many blocks and tiles, and a run of it that tasks share.
 
-use crate::shared::util::{self, Bench, Said};
+use crate::end_to_end::util::{self, Bench, Said};
 use outcrop_cloudgen::{Cloud, Kind};
 use std::path::PathBuf;
 use std::process::{Child, Stdio};

@@ -1,7 +1,7 @@
 //! The answers of `status`, and the ways to submit.
 
+use crate::end_to_end::util;
 use crate::shared::run::Case;
-use crate::shared::util;
 use std::os::unix::fs::PermissionsExt;
 use std::time::{Duration, SystemTime};
 

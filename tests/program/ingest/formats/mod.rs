@@ -19,7 +19,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use zoo::ZOO;
 
-const PAGE: &str = include_str!("../../../docs/formats.md");
+const PAGE: &str = include_str!("../../../../docs/formats.md");
 
 /// A row of a table: kind of file, outcome, message.
 struct Row {
