@@ -42,7 +42,7 @@ fn tests_are_skipped_in_one_way() {
         all.map(move |(module, text)| (format!("{folder}/{module}"), text))
     });
     let mut texts: BTreeMap<String, String> = texts.collect();
-    texts.remove("tests/skip").expect("tests/skip");
+    texts.remove("tests/program/skip").expect("tests/program/skip");
     // This file has them as words.
     texts.remove("tests/house/architecture/skips");
     assert!(texts.len() > 100, "{}", texts.len());
@@ -51,5 +51,5 @@ fn tests_are_skipped_in_one_way() {
         of_others || text.contains("skipped: ") || leaves_with_words(text) > 0
     });
     let wrong: Vec<&String> = wrong.map(|(module, _)| module).collect();
-    assert!(wrong.is_empty(), "use tests/skip/mod.rs: {wrong:?}");
+    assert!(wrong.is_empty(), "use tests/program/skip.rs: {wrong:?}");
 }
