@@ -140,9 +140,21 @@ impl Queue {
         self.into = (0..patch.points.len() as u32).collect();
         let mut free: Vec<_> = free.into_iter().collect();
         free.sort_unstable_by_key(|(v, _)| *v);
-        for (v, [low, high]) in free {
-            let diagonal = minus(high, low);
-            self.lists[step(COMPONENT * dot(diagonal, diagonal))].push(Queued {
+        let mut costs: Vec<_> = free
+            .into_iter()
+            .map(|(v, [low, high])| {
+                let diagonal = minus(high, low);
+                (v, step(COMPONENT * dot(diagonal, diagonal)))
+            })
+            .collect();
+        if !patch.locked.contains(&true)
+            && let Some(largest) = (0..costs.len()).max_by_key(|n| costs[*n].1)
+        {
+            // Something is left to show.
+            costs.remove(largest);
+        }
+        for (v, step) in costs {
+            self.lists[step].push(Queued {
                 ends: [v, v],
                 contractions: 0,
                 failed: false,
@@ -283,7 +295,17 @@ pub(super) fn coarse(surface: Surface<'_>, target: usize) -> Vec<[u32; 3]> {
             false => many = middle,
         }
     }
-    let chosen = chosen(surface, &cells(surface, few));
+    let joined = joined(surface, &cells(surface, few));
+    match joined.is_empty() {
+        // Something is left to show.
+        true => self::joined(surface, &cells(surface, many)),
+        false => joined,
+    }
+}
+
+/// The triangles that are left if the vertices in each cell are joined.
+fn joined(surface: Surface<'_>, cells: &[u64]) -> Vec<[u32; 3]> {
+    let chosen = chosen(surface, cells);
     let mut known = FxHashSet::default();
     let joined = surface
         .triangles

@@ -42,7 +42,9 @@ fn tests_are_skipped_in_one_way() {
         all.map(move |(module, text)| (format!("{folder}/{module}"), text))
     });
     let mut texts: BTreeMap<String, String> = texts.collect();
-    texts.remove("tests/program/skip").expect("tests/program/skip");
+    texts
+        .remove("tests/program/skip")
+        .expect("tests/program/skip");
     // This file has them as words.
     texts.remove("tests/house/architecture/skips");
     assert!(texts.len() > 100, "{}", texts.len());
