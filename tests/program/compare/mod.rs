@@ -260,7 +260,7 @@ fn a_subset_has_the_size_asked_for() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(20))]
+    #![proptest_config(ProptestConfig::with_cases(10))]
     #[test]
     fn as_brute_force(
         positions in prop::collection::vec(prop::array::uniform3(-1.0..1.0f64), 3..60),
@@ -320,7 +320,7 @@ fn limits_do_not_change_the_answer() {
     points.positions.iter_mut().for_each(|p| p[0] += 0.01);
     let cloud = bench.write("cloud.ply", points.binary());
     let options = Options {
-        samples: 300_000,
+        samples: 100_000,
         seed: 1,
     };
     let run = |budget, threads, less: u64| {
