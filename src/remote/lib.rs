@@ -32,6 +32,7 @@ pub use beside::{Beside, Expected};
 pub use list::{Listed, list};
 pub use location::Location;
 pub use object::{Object, Version};
+pub use pieces::GAP;
 pub use scratch::{Found, Scratch};
 pub use upload::{Bucket, Existing};
 pub use whole::Whole;

@@ -6,7 +6,7 @@ use std::ops::Range;
 pub(crate) const PIECE: u64 = 4 << 20;
 
 /// Ranges with a smaller gap between them are one request.
-const GAP: u64 = 16 << 10;
+pub const GAP: u64 = 16 << 10;
 
 /// Bytes that are fetched with one request.
 #[derive(Debug, PartialEq, Eq)]

@@ -5,7 +5,7 @@ use outcrop_disk::error::{Error, Result};
 use outcrop_disk::workspace::compressed::Content;
 use outcrop_disk::workspace::memory::Reservation;
 use outcrop_disk::workspace::{Workspace, lock};
-use outcrop_remote::{Counts, Location, Object, Room, Whole};
+use outcrop_remote::{Counts, GAP, Location, Object, Room, Whole};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
@@ -70,7 +70,11 @@ impl Remote {
     ) -> Result<()> {
         let mut held = lock(&self.held);
         *held = None;
-        let room = room(workspace);
+        let ranges: Vec<Range<u64>> = ranges.into_iter().collect();
+        let wanted = ranges
+            .iter()
+            .map(|range| range.end.saturating_sub(range.start) + GAP);
+        let room = room(wanted.fold(0, u64::saturating_add), workspace);
         *held = Some(workspace.reserve("fetched ahead", room.bytes)?);
         self.object.expect(ranges, room);
         Ok(())
@@ -141,7 +145,8 @@ impl Beside {
         begun: Option<i64>,
         workspace: &Workspace,
     ) -> Result<Expected> {
-        let room = room(workspace);
+        let wanted = files.iter().map(|(_, most)| *most);
+        let room = room(wanted.fold(0, u64::saturating_add), workspace);
         Ok(Expected {
             _held: workspace.reserve("fetched ahead", room.bytes)?,
             files: self.0.expect(files, room, begun),
@@ -162,11 +167,11 @@ impl Expected {
     }
 }
 
-/// Memory for what is fetched. Nothing is fetched before it is read where tasks share the files: each reads parts that
-/// are not known before.
-fn room(workspace: &Workspace) -> Room {
+/// Memory for what is fetched, `wanted` bytes in all. Nothing is fetched before it is read where tasks share the files:
+/// each reads parts that are not known before.
+fn room(wanted: u64, workspace: &Workspace) -> Room {
     Room {
-        bytes: AHEAD.min(workspace.memory.available() / SHARE),
+        bytes: AHEAD.min(workspace.memory.available() / SHARE).min(wanted),
         is_ahead: !workspace.is_shared(),
     }
 }
