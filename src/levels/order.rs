@@ -1,13 +1,45 @@
 //! The order of triangles: each lies beside one of the last, as far as it can be, so that the codec of triangles needs
 //! little more than a byte for each.
 
-use super::fans::Fans;
-
 /// Triangles beside the last ones that are looked at.
 const NEAR: usize = 12;
 
 /// Vertices that the codec remembers.
 const RECENT: u32 = 12;
+
+/// The triangles at each vertex.
+struct Fans {
+    starts: Vec<u32>,
+    triangles: Vec<u32>,
+}
+
+impl Fans {
+    fn of(vertices: usize, triangles: &[[u32; 3]]) -> Self {
+        let mut starts = vec![0; vertices + 1];
+        let corners = triangles.as_flattened();
+        corners.iter().for_each(|v| starts[*v as usize] += 1);
+        let mut sum = 0;
+        for start in &mut starts {
+            sum += *start;
+            *start = sum;
+        }
+        let mut all = vec![0; corners.len()];
+        for (corner, v) in corners.iter().enumerate().rev() {
+            let start = &mut starts[*v as usize];
+            *start -= 1;
+            all[*start as usize] = corner as u32 / 3;
+        }
+        Self {
+            starts,
+            triangles: all,
+        }
+    }
+
+    fn at(&self, vertex: u32) -> &[u32] {
+        let [from, to] = [0, 1].map(|n| self.starts[vertex as usize + n] as usize);
+        &self.triangles[from..to]
+    }
+}
 
 /// The triangles of a mesh with so many vertices, in another order.
 pub(super) fn of(vertices: usize, triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {

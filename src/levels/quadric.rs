@@ -36,18 +36,6 @@ pub(super) fn cross(p: V3, q: V3) -> V3 {
     ]
 }
 
-/// A normal of a triangle, as long as twice its area.
-pub(super) fn normal(corners: [V3; 3]) -> V3 {
-    cross(minus(corners[1], corners[0]), minus(corners[2], corners[0]))
-}
-
-/// Least cosine between the normals of a triangle before and after a contraction.
-pub(super) const TURN: f64 = 0.5;
-
-/// Least quality of a triangle that a contraction may make, unless one was worse before: 1 for equal sides, 0 for no
-/// area.
-pub(super) const QUALITY: f64 = 0.03;
-
 /// Weight of the pull towards the middle of an edge, by which a position is chosen where the planes leave it open: a
 /// part of the weight of the planes.
 const PULL: f64 = 1e-4;

@@ -1,8 +1,8 @@
 //! Simplification of tiles. The result has vertices of the given ones only, and is the same on every machine.
 
-use super::contract::Mesh;
-use super::quadric::{Quadric, V3, minus, of_triangles};
-use rustc_hash::FxHashSet;
+use super::patch::{Around, Patch, Vertices};
+use super::quadric::{Quadric, V3, dot, minus, of_triangles};
+use rustc_hash::{FxHashMap, FxHashSet};
 
 /// A mesh to simplify.
 #[derive(Debug, Clone, Copy)]
@@ -18,11 +18,238 @@ pub(super) struct Surface<'a> {
 /// A way to simplify to about this number of triangles, or as few as can be.
 pub(super) type Manner = fn(Surface<'_>, usize) -> Vec<[u32; 3]>;
 
+/// Bits of a cost that do not count: with the others, costs have two steps in an octave.
+const SHIFT: u32 = 22;
+
+/// Lists of the queue: one for each step of a cost that is a finite float.
+const LISTS: usize = (f32::INFINITY.to_bits() >> SHIFT) as usize + 1;
+
+/// Steps by which an edge that cannot be contracted is put off.
+const LATER: usize = 4;
+
+/// The part of the squared length of an edge that is added to its cost, so that short edges go first where the surface
+/// is flat.
+const LENGTH: f64 = 1e-9;
+
+/// The squared diagonal of a component times this is the cost at which it goes as a whole.
+const COMPONENT: f64 = 16.0;
+
+/// An edge in the queue, or a component, which has a vertex twice.
+#[derive(Debug, Clone, Copy)]
+struct Queued {
+    ends: [u32; 2],
+    /// The contractions at both ends when its cost was found.
+    contractions: u32,
+    /// True if it could not be contracted then.
+    failed: bool,
+}
+
+/// Edges by cost. That of an edge is found again when its turn comes, if it has changed meanwhile.
+struct Queue {
+    lists: Vec<Vec<Queued>>,
+    /// For each vertex the one into which it was put, or itself.
+    into: Vec<u32>,
+    /// For each vertex, how many contractions led to it.
+    contractions: Vec<u32>,
+}
+
+/// The step of what an edge costs: the mean squared distance of the end that stays from the planes of all triangles for
+/// which it will stand. The end that stays is the first. None if both ends are locked.
+fn look(patch: &Patch, [a, b]: [u32; 2]) -> Option<([u32; 2], usize)> {
+    let stays = |v: u32| (patch.locked[v as usize], patch.boundary[v as usize]);
+    let [p, q] = [a, b].map(|v| patch.points[v as usize]);
+    let [of_a, of_b] = [a, b].map(|v| &patch.quadrics[v as usize]);
+    let at_a = || of_a.here() + of_b.at(minus(p, q));
+    let at_b = || of_b.here() + of_a.at(minus(q, p));
+    let (ends, sum) = match (stays(a), stays(b)) {
+        ((true, _), (true, _)) => return None,
+        ((true, _), _) => ([a, b], at_a()),
+        (_, (true, _)) => ([b, a], at_b()),
+        ((_, true), (_, false)) => ([a, b], at_a()),
+        ((_, false), (_, true)) => ([b, a], at_b()),
+        _ => match (at_a(), at_b()) {
+            (one, other) if other < one => ([b, a], other),
+            (one, _) => ([a, b], one),
+        },
+    };
+    let area = (of_a.area + of_b.area).max(f64::MIN_POSITIVE);
+    let along = minus(q, p);
+    Some((ends, step(sum / area + LENGTH * dot(along, along))))
+}
+
+/// The step of a cost.
+fn step(cost: f64) -> usize {
+    let step = ((cost as f32).to_bits() >> SHIFT) as usize;
+    step.min(LISTS - 1)
+}
+
+impl Queue {
+    fn of(patch: &Patch) -> Self {
+        let count = patch.points.len();
+        let mut queue = Self {
+            lists: vec![Vec::new(); LISTS],
+            into: (0..count as u32).collect(),
+            contractions: vec![0; count],
+        };
+        queue.add_components(patch);
+        for [a, b, c] in patch.left() {
+            for (a, b) in [(*a, *b), (*b, *c), (*c, *a)] {
+                // Both sides of an edge name it, and one of them in this order. On a boundary it has one side.
+                let is_rim = patch.boundary[a as usize] && patch.boundary[b as usize];
+                if (a < b || is_rim)
+                    && let Some((ends, step)) = look(patch, [a, b])
+                {
+                    queue.lists[step].push(Queued {
+                        ends,
+                        contractions: 0,
+                        failed: false,
+                    });
+                }
+            }
+        }
+        queue
+    }
+
+    /// Queues all components without a locked vertex.
+    fn add_components(&mut self, patch: &Patch) {
+        for [a, b, c] in patch.left() {
+            let [a, b, c] = [*a, *b, *c].map(|v| self.now(v));
+            let least = a.min(b).min(c);
+            for v in [a, b, c] {
+                self.into[v as usize] = least;
+            }
+        }
+        let mut locked = vec![false; patch.points.len()];
+        for v in (0..patch.points.len() as u32).filter(|v| patch.locked[*v as usize]) {
+            locked[self.now(v) as usize] = true;
+        }
+        let mut free: FxHashMap<u32, [V3; 2]> = FxHashMap::default();
+        for t in patch.left() {
+            let first = self.now(t[0]);
+            if locked[first as usize] {
+                continue;
+            }
+            let [low, high] = free.entry(first).or_insert([[f64::MAX; 3], [f64::MIN; 3]]);
+            for p in t.map(|v| patch.points[v as usize]) {
+                for k in 0..3 {
+                    low[k] = low[k].min(p[k]);
+                    high[k] = high[k].max(p[k]);
+                }
+            }
+        }
+        self.into = (0..patch.points.len() as u32).collect();
+        let mut free: Vec<_> = free.into_iter().collect();
+        free.sort_unstable_by_key(|(v, _)| *v);
+        let mut costs: Vec<_> = free
+            .into_iter()
+            .map(|(v, [low, high])| {
+                let diagonal = minus(high, low);
+                (v, step(COMPONENT * dot(diagonal, diagonal)))
+            })
+            .collect();
+        if !patch.locked.contains(&true)
+            && let Some(largest) = (0..costs.len()).max_by_key(|n| costs[*n].1)
+        {
+            // Something is left to show.
+            costs.remove(largest);
+        }
+        for (v, step) in costs {
+            self.lists[step].push(Queued {
+                ends: [v, v],
+                contractions: 0,
+                failed: false,
+            });
+        }
+    }
+
+    /// What a vertex has become.
+    fn now(&mut self, mut vertex: u32) -> u32 {
+        while self.into[vertex as usize] != vertex {
+            let next = self.into[self.into[vertex as usize] as usize];
+            self.into[vertex as usize] = next;
+            vertex = next;
+        }
+        vertex
+    }
+
+    /// The edge as it is now. None if it is none any more, or if it is as it was when it could not be contracted.
+    fn renewed(&mut self, edge: Queued) -> Option<Queued> {
+        let ends = edge.ends.map(|v| self.now(v));
+        let [m, n] = ends.map(|v| self.contractions[v as usize]);
+        let contractions = m + n;
+        let is_same = contractions == edge.contractions;
+        (ends[0] != ends[1] && !(is_same && edge.failed)).then_some(Queued {
+            ends,
+            contractions,
+            failed: false,
+        })
+    }
+
+    /// Contracts edges, cheap ones first, down to this number of triangles or to the end of the queue.
+    fn contract(&mut self, patch: &mut Patch, target: usize) {
+        let mut around = Around::default();
+        for step in 0..LISTS {
+            while !self.lists[step].is_empty() {
+                for edge in std::mem::take(&mut self.lists[step]) {
+                    if patch.count <= target {
+                        return;
+                    }
+                    self.turn(patch, edge, step, &mut around);
+                }
+            }
+        }
+    }
+
+    /// Contracts an edge of this step, if it still costs that and can be contracted.
+    fn turn(&mut self, patch: &mut Patch, edge: Queued, step: usize, around: &mut Around) {
+        if edge.ends[0] == edge.ends[1] {
+            let vertex = self.now(edge.ends[0]);
+            patch.remove(vertex);
+            return;
+        }
+        let Some(mut now) = self.renewed(edge) else {
+            return;
+        };
+        if now.contractions != edge.contractions {
+            let Some((ends, new)) = look(patch, now.ends) else {
+                return;
+            };
+            now.ends = ends;
+            if new > step {
+                self.lists[new].push(now);
+                return;
+            }
+        }
+        let [a, b] = now.ends;
+        let place = patch.points[a as usize];
+        if patch.can_contract(a, b, around) && patch.keeps_triangles(a, b, place, around) {
+            patch.contract(a, b, place, around);
+            self.into[b as usize] = a;
+            self.contractions[a as usize] = now.contractions + 1;
+        } else if let Some(later) = self.lists.get_mut(step + LATER) {
+            now.failed = true;
+            later.push(now);
+        }
+    }
+}
+
 /// Contracts edges: the surface stays connected as it is, but small components may go.
 pub(super) fn careful(surface: Surface<'_>, target: usize) -> Vec<[u32; 3]> {
-    let mut mesh = Mesh::new(surface);
-    mesh.contract(target);
-    mesh.triangles
+    let vertices = Vertices {
+        points: surface.points.to_vec(),
+        quadrics: Vec::new(),
+        values: Vec::new(),
+        blended: Vec::new(),
+        locked: surface.locked.to_vec(),
+    };
+    let mut patch = Patch::new(vertices, surface.triangles.to_vec(), false);
+    let mut before = usize::MAX;
+    // What could not be contracted may be possible when all else is done.
+    while patch.count > target && patch.count < before - before / 64 {
+        before = patch.count;
+        Queue::of(&patch).contract(&mut patch, target);
+    }
+    patch.left().copied().collect()
 }
 
 /// Most cells of a grid along a side.

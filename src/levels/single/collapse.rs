@@ -1,6 +1,6 @@
 //! Contraction of edges, cheapest first.
 
-use super::patch::{Around, Patch};
+use crate::patch::{Around, Patch};
 use crate::quadric::{V3, minus};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;

@@ -1,17 +1,16 @@
 //! One mesh with fewer triangles, of a mesh of any size, in bounded memory.
 //!
 //! The triangles are divided into the cells of an octree, and in each cell edges are contracted, the cheapest first
-//! (`collapse`, `patch`, and `quadric`, which tiles have as well). A vertex that several cells have stays. What is left
-//! is put together and is the mesh of the next pass (`kept`), whose octree is moved, so that the borders of the former
-//! cells lie inside of cells. Quadrics go with the vertices from pass to pass: the mesh is about the one that a single
-//! pass over all triangles would make. `passes` decides how far each pass goes. The cells do not depend on memory or
-//! threads, so neither does the mesh.
+//! (`collapse`, and `patch` and `quadric`, which tiles have as well). A vertex that several cells have stays. What is left is put together and is the
+//! mesh of the next pass (`kept`), whose octree is moved, so that the borders of the former cells lie inside of cells.
+//! Quadrics go with the vertices from pass to pass: the mesh is about the one that a single pass over all triangles
+//! would make. `passes` decides how far each pass goes. The cells do not depend on memory or threads, so neither does
+//! the mesh.
 
 mod collapse;
 mod kept;
 mod pass;
 mod passes;
-mod patch;
 
 use crate::intake::{self, About, Reader, Stored};
 use crate::quadric::NUMBERS;

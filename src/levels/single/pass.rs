@@ -2,10 +2,10 @@
 
 use super::collapse::{Curve, End, contract};
 use super::kept::Kept;
-use super::patch::{Patch, Vertices};
 use super::{Intake, Options};
 use crate::cells::{self, Cells, Division};
 use crate::intake::{BLOCK, Stored};
+use crate::patch::{Patch, Vertices};
 use crate::quadric::{NUMBERS, Quadric};
 use crate::rows::{CellTriangle, CellVertex, KeptValue, KeptVertex, SharedVertex};
 use crate::shared::{local, share_vertices};

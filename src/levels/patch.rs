@@ -1,11 +1,16 @@
 //! The triangles of a cell while edges are contracted: fans of vertices, and what a contraction would do to them.
 
-use crate::quadric::{
-    NUMBERS, QUALITY, Quadric, TURN, V3, cross, dot, minus, normal, of_triangles,
-};
+use super::quadric::{NUMBERS, Quadric, V3, cross, dot, minus, of_triangles};
 
 /// The end of a list.
 const NONE: u32 = u32::MAX;
+
+/// Least cosine between the normals of a triangle before and after a contraction.
+const TURN: f64 = 0.5;
+
+/// Least quality of a triangle that a contraction may make, unless one was worse before: 1 for equal sides, 0 for no
+/// area.
+const QUALITY: f64 = 0.03;
 
 /// Weight of the planes that hold a boundary, a part of the squared length of its edges.
 const BOUNDARY: f64 = 1.0;
@@ -55,6 +60,10 @@ pub(super) struct Around {
 
 pub(super) fn is_gone(triangle: &[u32; 3]) -> bool {
     triangle[0] == NONE
+}
+
+fn normal(corners: [V3; 3]) -> V3 {
+    cross(minus(corners[1], corners[0]), minus(corners[2], corners[0]))
 }
 
 /// 1 for equal sides, 0 for no area.
@@ -352,6 +361,21 @@ impl Patch {
             self.next[last as usize] = self.head[at];
             self.head[at] = self.head[from];
             self.head[from] = NONE;
+        }
+    }
+
+    /// Removes all triangles that hang together with a vertex.
+    pub fn remove(&mut self, vertex: u32) {
+        let (mut open, mut fan) = (vec![vertex], Vec::new());
+        while let Some(vertex) = open.pop() {
+            fan.clear();
+            self.fan(vertex, &mut fan);
+            self.count -= fan.len();
+            for triangle in &fan {
+                let corners = &mut self.triangles[*triangle as usize];
+                open.extend(*corners);
+                corners[0] = NONE;
+            }
         }
     }
 
