@@ -17,7 +17,7 @@ pub const INTENSITY: &str = "intensity";
 pub const CLASSIFICATION: &str = "classification";
 
 /// The scanner that saw a point, in files that give positions of scanners: its number in
-/// [`PointFile::scanners`](super::point_format::PointFile::scanners), or [`NO_SCANNER`].
+/// `PointFile::scanners` of the readers, or [`NO_SCANNER`].
 pub const SCANNER: &str = "scanner";
 
 /// Of points whose scanner is unknown.
@@ -267,7 +267,7 @@ impl Wanted {
     /// Of a file with these columns.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if those for the mesh take more than [`MOST_BYTES`].
+    /// [`Error::Parameter`] if those for the mesh take more than `MOST_BYTES`.
     pub fn of(attributes: &Attributes, columns: &[Column], also: Also) -> Result<Self> {
         let mut numbers = attributes.of(columns);
         let bytes: usize = numbers.iter().map(|n| columns[*n].scalar.bytes()).sum();
