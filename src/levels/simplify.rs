@@ -162,7 +162,7 @@ impl Queue {
         }
     }
 
-    /// What a vertex has become.
+    /// The vertex into which this one was contracted, or itself.
     fn now(&mut self, mut vertex: u32) -> u32 {
         while self.into[vertex as usize] != vertex {
             let next = self.into[self.into[vertex as usize] as usize];

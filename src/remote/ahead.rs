@@ -18,7 +18,7 @@ use std::thread::JoinHandle;
 /// Most requests at the same time.
 const REQUESTS: usize = 8;
 
-/// What is known of a piece.
+/// The state of a piece.
 #[derive(Debug)]
 enum State {
     Waiting,

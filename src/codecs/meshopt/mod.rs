@@ -9,7 +9,7 @@ mod triangles;
 #[cfg(test)]
 mod tests;
 
-/// What is wrong with bytes that cannot be decoded, in words.
+/// The reason why bytes cannot be decoded, in words.
 type Damaged = &'static str;
 
 /// Takes bytes from the front of these.

@@ -52,7 +52,7 @@ impl<T: Copy> Recent<T> {
     }
 }
 
-/// What encoder and decoder know of the triangles before.
+/// The state that encoder and decoder share: edges and vertices of the triangles before.
 struct Known {
     next: u32,
     last: u32,
